@@ -1,0 +1,57 @@
+#include "semvslam/geometry/camera.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace semvslam {
+namespace {
+
+Eigen::Vector2d apply(const BrownDistortion& d, const Eigen::Vector2d& n) {
+  const double x = n.x(), y = n.y();
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
+  return {x * radial + 2 * d.p1 * x * y + d.p2 * (r2 + 2 * x * x),
+          y * radial + d.p1 * (r2 + 2 * y * y) + 2 * d.p2 * x * y};
+}
+
+}  // namespace
+
+Eigen::Vector2d Camera::distort(const Eigen::Vector2d& ideal) const {
+  if (distortion.is_zero()) return ideal;
+  const Eigen::Vector2d d = apply(distortion, {(ideal.x() - cx_px) / fx_px, (ideal.y() - cy_px) / fy_px});
+  return {fx_px * d.x() + cx_px, fy_px * d.y() + cy_px};
+}
+
+Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& recorded) const {
+  if (distortion.is_zero()) return recorded;
+  const Eigen::Vector2d target((recorded.x() - cx_px) / fx_px, (recorded.y() - cy_px) / fy_px);
+  Eigen::Vector2d n = target;
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector2d step = target - apply(distortion, n);
+    n += step;
+    if (step.squaredNorm() < 1e-18) break;
+  }
+  return {fx_px * n.x() + cx_px, fy_px * n.y() + cy_px};
+}
+
+Status Camera::check() const {
+  const auto bad = [](const std::string& what) { return Error{ErrorCode::kInvalidInput, "camera: " + what}; };
+  if (width_px < 16 || height_px < 16 || width_px > 16384 || height_px > 16384)
+    return bad(fmt::format("image size {}x{} is outside 16..16384", width_px, height_px));
+  if (!(std::isfinite(fx_px) && std::isfinite(fy_px) && fx_px > 0 && fy_px > 0))
+    return bad(fmt::format("focal lengths must be positive, got fx = {}, fy = {}", fx_px, fy_px));
+  if (!(cx_px >= 0 && cy_px >= 0 && cx_px < width_px && cy_px < height_px))
+    return bad(fmt::format("principal point ({}, {}) lies outside the {}x{} image", cx_px, cy_px, width_px, height_px));
+  if (!(std::isfinite(depth_units_per_m) && depth_units_per_m > 0))
+    return bad(fmt::format("depth_units_per_m must be positive, got {}", depth_units_per_m));
+  if (!(std::isfinite(baseline_m) && baseline_m > 0)) return bad(fmt::format("baseline_m must be positive, got {}", baseline_m));
+  if (!(std::isfinite(frame_rate_hz) && frame_rate_hz > 0))
+    return bad(fmt::format("frame_rate_hz must be positive, got {}", frame_rate_hz));
+  const BrownDistortion& d = distortion;
+  for (double k : {d.k1, d.k2, d.p1, d.p2, d.k3})
+    if (!std::isfinite(k)) return bad("distortion coefficients must be finite numbers");
+  return Status::success();
+}
+
+}  // namespace semvslam
