@@ -16,9 +16,9 @@ struct Range {
   double high = std::numeric_limits<double>::infinity();
 };
 
-/// The one description of every configuration value: key, type, default, allowed values, meaning. Bound to the fields of
-/// option structs; loading, `--set`, the effective config file, the help text and the documentation page come from it.
-/// The default of a key is what its field holds when it is added.
+/// The one description of every configuration value: key, type, default, allowed values, meaning. Bound to the fields
+/// of option structs; loading, `--set`, the effective config file, the help text and the documentation page come from
+/// it. The default of a key is what its field holds when it is added.
 class ConfigSchema {
  public:
   /// @param key dotted, lower case: "orb.features". @param doc one line, with the unit.
@@ -28,8 +28,8 @@ class ConfigSchema {
   /// @param choices empty = any text.
   void add(std::string key, std::string* field, std::vector<std::string> choices, std::string doc);
 
-  /// Sets values from nested YAML. An unknown key, a wrong type or a value out of range is an Error that names the origin,
-  /// the line, the key and, for unknown keys, the nearest known one. Nothing is changed on error.
+  /// Sets values from nested YAML. An unknown key, a wrong type or a value out of range is an Error that names the
+  /// origin, the line, the key and, for unknown keys, the nearest known one. Nothing is changed on error.
   Status load_yaml(const std::string& text, const std::string& origin);
   /// Sets one value from "key=value".
   Status set(std::string_view assignment);
@@ -42,10 +42,11 @@ class ConfigSchema {
  private:
   struct Entry {
     std::string key, type, doc, default_text, range_text;
-    std::function<Status(const std::string&)> check;   // of the text of a value
-    std::function<void(const std::string&)> assign;    // after check
+    std::function<Status(const std::string&)> check;  // of the text of a value
+    std::function<void(const std::string&)> assign;   // after check
     std::function<std::string()> get;
   };
+  void add_entry(Entry entry, const void* field);
   const Entry* find(std::string_view key) const;
   Error unknown_key(std::string_view key, const std::string& where) const;
   std::vector<Entry> entries_;
