@@ -25,26 +25,26 @@ struct Match {
 };
 
 struct MatchOptions {
-  int max_distance = 64;        // bits; 0..256
-  float ratio = 0.8f;           // the best distance must be <= ratio * that of the best rival; >= 1 switches the test off
+  int max_distance = 64;  // bits; 0..256
+  float ratio = 0.8f;     // the best distance must be <= ratio * that of the best rival; >= 1 switches the test off
   bool check_rotation = false;  // keep only matches whose change of angle agrees with most of the others
 };
 
 /// Gives each query the nearest descriptor among the features inside its square and level range.
 ///
-/// The ratio test (Lowe, IJCV 2004) asks whether ANOTHER place of the image looks as good. Corners are often found on two or
-/// three levels at one place; such a twin is the same physical point, so it is no rival: a second best counts only when it is
-/// on the level of the best or more than 3 px away from it.
-/// Each feature is given to at most one query: the smaller distance wins, on equal distances the lower query index. The loser
-/// gets no second choice (a landmark whose best feature is taken is most likely occluded or wrong).
+/// The ratio test (Lowe, IJCV 2004) asks whether ANOTHER place of the image looks as good. Corners are often found on
+/// two or three levels at one place; such a twin is the same physical point, so it is no rival: a second best counts
+/// only when it is on the level of the best or more than 3 px away from it. Each feature is given to at most one query:
+/// the smaller distance wins, on equal distances the lower query index. The loser gets no second choice (a landmark
+/// whose best feature is taken is most likely occluded or wrong).
 /// @param features level, angle, descriptor and recorded position of the features; index i is point i of the grid.
 /// @param grid of the positions in the same pixel frame as the queries (usually undistorted).
 /// @param out overwritten, ascending by query.
 void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures& features, const ImageGrid& grid,
                      const MatchOptions& options, std::vector<Match>& out);
 
-/// Pairs (i, j) where b[j] is the nearest of b to a[i] and a[i] the nearest of a to b[j] (ties: the lower index), that pass
-/// the maximum distance and, in both directions, the ratio test. check_rotation is not used: there are no angles.
+/// Pairs (i, j) where b[j] is the nearest of b to a[i] and a[i] the nearest of a to b[j] (ties: the lower index), that
+/// pass the maximum distance and the ratio test from a to b. check_rotation is not used: there are no angles.
 /// @param out overwritten, ascending by query.
 void match_brute_force(std::span<const Descriptor> a, std::span<const Descriptor> b, const MatchOptions& options,
                        std::vector<Match>& out);

@@ -9,21 +9,21 @@
 namespace semvslam {
 
 struct OrbOptions {
-  int features = 1000;          // aimed at per image
-  int levels = 8;               // of the pyramid
-  double scale_factor = 1.2;    // between levels
-  int fast_threshold = 20;      // grey levels
-  int fast_threshold_low = 7;   // in cells where the first finds nothing
-  int cell_px = 32;             // side of the cells that corners are spread over
-  bool subpixel = true;         // refine corners by a parabola through the corner score
+  int features = 1000;         // aimed at per image
+  int levels = 8;              // of the pyramid
+  double scale_factor = 1.2;   // between levels
+  int fast_threshold = 20;     // grey levels
+  int fast_threshold_low = 7;  // in cells where the first finds nothing
+  int cell_px = 32;            // side of the cells that corners are spread over
+  bool subpixel = true;        // refine corners by a parabola through the corner score
 };
 
 /// Scale factor^level for every level of `options`.
 std::vector<float> level_scales(const OrbOptions& options);
 
 /// Oriented FAST corners with rotated BRIEF descriptors on an image pyramid, spread evenly over the image.
-/// Deterministic: the same image and mask give the same bytes, on any number of cores. Not thread-safe: keeps its buffers
-/// between calls (no allocation per frame once warm); use one extractor per thread.
+/// Deterministic: the same image and mask give the same bytes, on any number of cores. Not thread-safe: keeps its
+/// buffers between calls (no allocation per frame once warm); use one extractor per thread.
 class OrbExtractor {
  public:
   explicit OrbExtractor(const OrbOptions& options);

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace semvslam {
+
+/// Every test point lies within this distance of the corner, in pixels of its level, before and after rotation.
+constexpr int kBriefRadius = 15;
+
+/// One binary test: is the blurred patch darker at a than at b? Offsets from the corner in pixels, y down, angle 0.
+struct BriefTest {
+  std::int8_t ax, ay, bx, by;
+};
+
+/// The 256 tests: point pairs drawn from an isotropic Gaussian (Calonder et al., BRIEF, ECCV 2010, variant G II).
+/// Made from a fixed seed with integer arithmetic only, so that every machine makes the same ones.
+const std::array<BriefTest, 256>& brief_pattern();
+
+}  // namespace semvslam

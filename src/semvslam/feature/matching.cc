@@ -1,0 +1,166 @@
+#include "semvslam/feature/matching.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace semvslam {
+namespace {
+
+constexpr int kNoDistance = 257;     // above every Hamming distance
+constexpr float kSamePlacePx = 3.f;  // corners of other levels this near are the same physical point
+constexpr int kAngleBins = 36;       // of 10 degrees
+constexpr float kAngleTolerance_rad = 30.f * std::numbers::pi_v<float> / 180.f;
+
+bool passes_ratio(int best, int rival, float ratio) {
+  return rival == kNoDistance || static_cast<float>(best) <= ratio * static_cast<float>(rival);
+}
+
+/// The best feature for one query; feature = -1 when none passes.
+class BestMatch {
+ public:
+  BestMatch(const ProjectedQuery& query, const OrbFeatures& features) : query_(query), features_(features) {}
+
+  void offer(std::uint32_t index) {
+    const Keypoint& keypoint = features_.keypoints[index];
+    if (keypoint.level < query_.min_level || keypoint.level > query_.max_level) return;
+    const int distance = hamming_distance(query_.descriptor, features_.descriptors[index]);
+    if (distance < best_ || (distance == best_ && static_cast<int>(index) < feature_)) {
+      best_ = distance;
+      feature_ = static_cast<int>(index);
+    }
+  }
+
+  /// Second pass, after every candidate was offered: who is a rival depends on which one is the best.
+  void offer_rival(std::uint32_t index) {
+    if (static_cast<int>(index) == feature_) return;
+    const Keypoint& k = features_.keypoints[index];
+    if (k.level < query_.min_level || k.level > query_.max_level) return;
+    const Keypoint& b = features_.keypoints[static_cast<std::size_t>(feature_)];
+    const bool twin =
+        k.level != b.level && std::abs(k.x_px - b.x_px) <= kSamePlacePx && std::abs(k.y_px - b.y_px) <= kSamePlacePx;
+    if (!twin) rival_ = std::min(rival_, hamming_distance(query_.descriptor, features_.descriptors[index]));
+  }
+
+  int feature() const { return feature_; }
+  int distance() const { return best_; }
+  int rival() const { return rival_; }
+
+ private:
+  const ProjectedQuery& query_;
+  const OrbFeatures& features_;
+  int feature_ = -1, best_ = kNoDistance, rival_ = kNoDistance;
+};
+
+/// Change of angle from query to feature in [0, 2 pi).
+float angle_change_rad(const ProjectedQuery& query, const Keypoint& keypoint) {
+  constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+  const float change = std::fmod(keypoint.angle_rad - query.angle_rad, kTurn);
+  return change < 0 ? change + kTurn : change;
+}
+
+/// Keeps matches whose change of angle lies near the peak of all changes. An image turns as a whole, so right matches
+/// agree and wrong ones spread over the circle.
+void drop_odd_rotations(std::span<const ProjectedQuery> queries, const OrbFeatures& features,
+                        std::vector<Match>& matches) {
+  constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+  const auto change_of = [&](const Match& m) {
+    return angle_change_rad(queries[static_cast<std::size_t>(m.query)],
+                            features.keypoints[static_cast<std::size_t>(m.feature)]);
+  };
+  const auto known = [&](const Match& m) { return queries[static_cast<std::size_t>(m.query)].angle_rad >= 0; };
+
+  std::array<int, kAngleBins> histogram{};
+  for (const Match& m : matches) {
+    if (known(m)) ++histogram[static_cast<std::size_t>(change_of(m) * (kAngleBins / kTurn)) % kAngleBins];
+  }
+  const auto around = [&](int bin) {  // three neighbouring bins: the peak may straddle a border
+    return histogram[static_cast<std::size_t>((bin + kAngleBins - 1) % kAngleBins)] +
+           histogram[static_cast<std::size_t>(bin)] + histogram[static_cast<std::size_t>((bin + 1) % kAngleBins)];
+  };
+  int peak = 0;
+  for (int bin = 1; bin < kAngleBins; ++bin) {
+    if (around(bin) > around(peak)) peak = bin;
+  }
+  // Centre of the peak: mean of its members, relative to the middle of the bin.
+  const float middle = (static_cast<float>(peak) + 0.5f) * (kTurn / kAngleBins);
+  float sum = 0;
+  int members = 0;
+  for (const Match& m : matches) {
+    if (!known(m)) continue;
+    const float offset = std::remainder(change_of(m) - middle, kTurn);
+    if (std::abs(offset) > 1.5f * (kTurn / kAngleBins)) continue;
+    sum += offset;
+    ++members;
+  }
+  const float centre = middle + (members > 0 ? sum / static_cast<float>(members) : 0.f);
+  std::erase_if(matches, [&](const Match& m) {
+    return known(m) && std::abs(std::remainder(change_of(m) - centre, kTurn)) > kAngleTolerance_rad;
+  });
+}
+
+/// Leaves each feature to its nearest query.
+void make_one_to_one(std::size_t features, std::vector<Match>& matches) {
+  std::vector<int> owner(features, -1);  // position in matches
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    int& o = owner[static_cast<std::size_t>(matches[i].feature)];
+    if (o < 0 || matches[i].distance < matches[static_cast<std::size_t>(o)].distance) o = static_cast<int>(i);
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (owner[static_cast<std::size_t>(matches[i].feature)] == static_cast<int>(i)) matches[kept++] = matches[i];
+  }
+  matches.resize(kept);
+}
+
+}  // namespace
+
+void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures& features, const ImageGrid& grid,
+                     const MatchOptions& options, std::vector<Match>& out) {
+  out.clear();
+  for (std::size_t q = 0; q < queries.size(); ++q) {
+    const ProjectedQuery& query = queries[q];
+    BestMatch best(query, features);
+    grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) { best.offer(i); });
+    if (best.feature() < 0 || best.distance() > options.max_distance) continue;
+    if (options.ratio < 1.f) {
+      grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) { best.offer_rival(i); });
+      if (!passes_ratio(best.distance(), best.rival(), options.ratio)) continue;
+    }
+    out.push_back({static_cast<int>(q), best.feature(), best.distance()});
+  }
+  if (options.check_rotation) drop_odd_rotations(queries, features, out);
+  make_one_to_one(features.size(), out);
+}
+
+void match_brute_force(std::span<const Descriptor> a, std::span<const Descriptor> b, const MatchOptions& options,
+                       std::vector<Match>& out) {
+  out.clear();
+  struct Nearest {
+    int index = -1, distance = kNoDistance;
+  };
+  std::vector<Nearest> nearest_to_b(b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    Nearest best;
+    int second = kNoDistance;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const int distance = hamming_distance(a[i], b[j]);
+      if (distance < best.distance) {
+        second = best.distance;
+        best = {static_cast<int>(j), distance};
+      } else {
+        second = std::min(second, distance);
+      }
+      if (distance < nearest_to_b[j].distance) nearest_to_b[j] = {static_cast<int>(i), distance};
+    }
+    if (best.distance <= options.max_distance && passes_ratio(best.distance, second, options.ratio)) {
+      out.push_back({static_cast<int>(i), best.index, best.distance});
+    }
+  }
+  std::erase_if(out,
+                [&](const Match& m) { return nearest_to_b[static_cast<std::size_t>(m.feature)].index != m.query; });
+}
+
+}  // namespace semvslam
