@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "semvslam/base/ids.h"
+#include "semvslam/base/result.h"
+#include "semvslam/base/time_stamp.h"
+#include "semvslam/geometry/se3.h"
+#include "semvslam/map/frame_features.h"
+
+namespace semvslam {
+
+/// Where a landmark was seen.
+struct Observation {
+  KeyFrameId key_frame;
+  std::uint32_t feature = 0;
+  friend bool operator==(const Observation&, const Observation&) = default;
+};
+
+/// A point of the static world.
+struct Landmark {
+  LandmarkId id;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // world, metres
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // mean direction from the cameras that saw it to it, unit length
+  float min_distance_m = 0, max_distance_m = 0;        // distances at which its pyramid level lies inside the pyramid
+  Descriptor descriptor{};                             // the observation that is nearest to all others
+  std::vector<Observation> observations;               // ascending by key frame
+  KeyFrameId first_key_frame;
+  int visible = 1, found = 1;                          // frames in which it should have been / was seen
+};
+
+/// An image that the map keeps.
+struct KeyFrame {
+  KeyFrameId id;
+  FrameId frame;
+  TimeStamp stamp;
+  SE3 camera_from_world;
+  std::shared_ptr<const FrameFeatures> features;
+  std::vector<LandmarkId> landmarks;  // per feature; invalid = none
+};
+
+/// Another key frame that sees the same landmarks.
+struct Covisible {
+  KeyFrameId key_frame;
+  int shared = 0;  // landmarks in common
+};
+
+/// Key frames and landmarks as values keyed by id; observations indexed from both sides, kept consistent by going through
+/// this class for every change. One writer (the mapping stage); no locks inside. Iteration order never depends on addresses.
+class Map {
+ public:
+  explicit Map(std::shared_ptr<const ObservationModel> model) : model_(std::move(model)) {}
+
+  const ObservationModel& model() const { return *model_; }
+
+  KeyFrameId add_key_frame(FrameId frame, TimeStamp stamp, const SE3& camera_from_world,
+                           std::shared_ptr<const FrameFeatures> features);
+  /// Removes a key frame with its observations; landmarks that nobody sees any more go too. Its pose stays known relative to
+  /// `anchor` (see camera_from_world), so that the frames tracked against it keep theirs.
+  void remove_key_frame(KeyFrameId id, KeyFrameId anchor);
+
+  LandmarkId add_landmark(const Eigen::Vector3d& position, KeyFrameId key_frame, std::uint32_t feature);
+  void remove_landmark(LandmarkId id);
+  /// `from` was found to be the same point as `into`: moves the observations over; resolve(from) == into afterwards.
+  void fuse_landmarks(LandmarkId from, LandmarkId into);
+  /// @return false when the key frame sees the landmark already or the feature is taken.
+  bool add_observation(LandmarkId landmark, KeyFrameId key_frame, std::uint32_t feature);
+  /// Removes one observation; a landmark left without any is removed.
+  void remove_observation(LandmarkId landmark, KeyFrameId key_frame);
+
+  void set_pose(KeyFrameId id, const SE3& camera_from_world) { key_frames_.at(id).camera_from_world = camera_from_world; }
+  void set_position(LandmarkId id, const Eigen::Vector3d& p) { landmarks_.at(id).position = p; }
+  void count_visible(LandmarkId id, int visible, int found);
+  /// Recomputes descriptor, normal and distance limits from the observations.
+  void refresh_landmark(LandmarkId id);
+  /// Normal and distance limits only (after poses or positions moved).
+  void refresh_geometry(LandmarkId id);
+
+  const KeyFrame* key_frame(KeyFrameId id) const;
+  const Landmark* landmark(LandmarkId id) const;
+  /// Follows fusions: the id under which a landmark lives now; invalid when it is gone.
+  LandmarkId resolve(LandmarkId id) const;
+  /// The newest fusions (from, into), ascending by `from`; older ones are forgotten.
+  std::vector<std::pair<LandmarkId, LandmarkId>> recent_fusions() const;
+  /// Pose of a key frame, also of one that was removed (through its anchor). Empty for ids never given out.
+  std::optional<SE3> camera_from_world(KeyFrameId id) const;
+
+  /// Key frames that share at least `min_shared` landmarks with `id`, most first (ties: newer first). Computed on demand.
+  std::vector<Covisible> covisible(KeyFrameId id, int min_shared) const;
+
+  const std::map<KeyFrameId, KeyFrame>& key_frames() const { return key_frames_; }
+  std::size_t landmark_count() const { return landmarks_.size(); }
+  /// Ids of all landmarks, ascending.
+  std::vector<LandmarkId> landmark_ids() const;
+
+  /// Everything that must hold between key frames, landmarks and observations; the message names the first broken rule.
+  Status check_invariants() const;
+
+ private:
+  struct Removed {
+    KeyFrameId anchor;
+    SE3 camera_from_anchor;
+  };
+
+  std::shared_ptr<const ObservationModel> model_;
+  std::map<KeyFrameId, KeyFrame> key_frames_;
+  std::unordered_map<LandmarkId, Landmark> landmarks_;
+  std::unordered_map<KeyFrameId, Removed> removed_key_frames_;
+  std::map<LandmarkId, LandmarkId> fused_;
+  std::deque<LandmarkId> fused_order_;  // oldest first
+  std::uint32_t next_key_frame_ = 0, next_landmark_ = 0;
+};
+
+}  // namespace semvslam

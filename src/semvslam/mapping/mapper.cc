@@ -1,0 +1,255 @@
+#include "semvslam/mapping/mapper.h"
+
+#include <algorithm>
+#include <chrono>
+#include <unordered_set>
+
+namespace semvslam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double lap_ms(Clock::time_point& start) {
+  const Clock::time_point now = Clock::now();
+  const double ms = std::chrono::duration<double, std::milli>(now - start).count();
+  start = now;
+  return ms;
+}
+
+}  // namespace
+
+Mapper::Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model)
+    : options_(options), map_(std::move(model)) {}
+
+std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::stop_token stop) {
+  const Clock::time_point begin = Clock::now();
+  Clock::time_point lap = begin;
+  times_ = {};
+  const KeyFrameId id = insert(key_frame);
+  cull_landmarks(id);
+  create_landmarks(id);
+  times_.create_ms = lap_ms(lap);
+  if (map_.key_frames().size() > 1) {
+    fuse_with_neighbours(id);
+    times_.fuse_ms = lap_ms(lap);
+    adjust_neighbourhood(id, stop);
+    times_.bundle_ms = lap_ms(lap);
+    cull_key_frames(id);
+    times_.cull_ms = lap_ms(lap);
+  }
+  std::shared_ptr<const LocalMap> local = make_local_map(map_, id, options_.local_map);
+  lap = begin;
+  times_.total_ms = lap_ms(lap);
+  return local;
+}
+
+KeyFrameId Mapper::insert(const NewKeyFrame& key_frame) {
+  const KeyFrameId id = map_.add_key_frame(key_frame.frame, key_frame.stamp, key_frame.camera_from_world, key_frame.features);
+  for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i) {
+    const LandmarkId landmark = map_.resolve(key_frame.landmarks[i]);
+    if (landmark.valid() && map_.add_observation(landmark, id, static_cast<std::uint32_t>(i))) map_.refresh_landmark(landmark);
+  }
+  return id;
+}
+
+void Mapper::create_landmarks(KeyFrameId id) {
+  const KeyFrame& key_frame = *map_.key_frame(id);
+  const FrameFeatures& features = *key_frame.features;
+  const SE3 world_from_camera = key_frame.camera_from_world.inverse();
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (key_frame.landmarks[i].valid() || !features.has_depth(i)) continue;
+    if (features.depth_m[i] > options_.max_landmark_depth_m) continue;
+    const Eigen::Vector3d in_world = world_from_camera * map_.model().back_project(features, i);
+    young_.push_back(map_.add_landmark(in_world, id, static_cast<std::uint32_t>(i)));
+  }
+}
+
+void Mapper::cull_landmarks(KeyFrameId newest) {
+  std::size_t kept = 0;
+  for (const LandmarkId id : young_) {
+    const Landmark* landmark = map_.landmark(id);
+    if (landmark == nullptr) continue;
+    const int age = static_cast<int>(newest.value - landmark->first_key_frame.value);
+    const bool seldom_found = landmark->found < options_.min_found_ratio * landmark->visible;
+    const bool alone = age >= options_.young_key_frames && landmark->observations.size() < 3;
+    if (seldom_found || alone) {
+      map_.remove_landmark(id);
+      continue;
+    }
+    if (age < options_.young_key_frames) young_[kept++] = id;
+  }
+  young_.resize(kept);
+}
+
+std::vector<KeyFrameId> Mapper::fusion_partners(KeyFrameId id) const {
+  std::vector<KeyFrameId> partners;
+  for (const Covisible& c : map_.covisible(id, options_.min_shared)) {
+    if (partners.size() >= static_cast<std::size_t>(options_.fuse_key_frames)) break;
+    partners.push_back(c.key_frame);
+  }
+  // Key frames of an earlier visit share no landmark yet: that is what fusing them is for.
+  for (const KeyFrameId near : nearby_key_frames(map_, id, options_.local_map, partners)) {
+    if (partners.size() >= static_cast<std::size_t>(options_.fuse_key_frames + options_.local_map.nearby_key_frames)) break;
+    partners.push_back(near);
+  }
+  return partners;
+}
+
+void Mapper::fuse_with_neighbours(KeyFrameId id) {
+  const std::vector<KeyFrameId> partners = fusion_partners(id);
+  std::vector<LandmarkId> own;
+  for (const LandmarkId landmark : map_.key_frame(id)->landmarks)
+    if (landmark.valid()) own.push_back(landmark);
+  for (const KeyFrameId partner : partners) fuse_into(own, partner);
+  std::vector<LandmarkId> theirs;
+  for (const KeyFrameId partner : partners)
+    for (const LandmarkId landmark : map_.key_frame(partner)->landmarks)
+      if (landmark.valid()) theirs.push_back(landmark);
+  std::sort(theirs.begin(), theirs.end());
+  theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
+  fuse_into(theirs, id);
+  for (const LandmarkId landmark : map_.key_frame(id)->landmarks)
+    if (landmark.valid()) map_.refresh_landmark(landmark);
+}
+
+void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target) {
+  const KeyFrame& key_frame = *map_.key_frame(target);
+  const FrameFeatures& features = *key_frame.features;
+  const ObservationModel& model = map_.model();
+  const Camera& camera = model.camera();
+  const Eigen::Vector3d centre = key_frame.camera_from_world.inverse().translation();
+  std::unordered_set<LandmarkId> seen(key_frame.landmarks.begin(), key_frame.landmarks.end());
+  std::vector<LandmarkId> sources;
+  std::vector<Eigen::Vector3d> in_camera;
+  queries_.clear();
+  for (const LandmarkId id : landmarks) {
+    const Landmark* landmark = map_.landmark(id);
+    if (landmark == nullptr || seen.contains(id)) continue;
+    const Eigen::Vector3d p = key_frame.camera_from_world * landmark->position;
+    if (p.z() < 0.05) continue;
+    const Eigen::Vector2d pixel = camera.project(p);
+    if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() >= camera.width_px || pixel.y() >= camera.height_px) continue;
+    const Eigen::Vector3d ray = landmark->position - centre;
+    const auto distance = static_cast<float>(ray.norm());
+    if (distance < 0.8f * landmark->min_distance_m || distance > 1.2f * landmark->max_distance_m) continue;
+    if (ray.dot(landmark->normal.cast<double>()) < 0.5 * distance) continue;
+    const int level = model.predict_level(landmark->max_distance_m / distance);
+    const float radius = static_cast<float>(options_.fuse_radius_px) * model.level_scale(level);
+    queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, level - 1, level + 1,
+                        landmark->descriptor, -1.f});
+    sources.push_back(id);
+    in_camera.push_back(p);
+  }
+  match_projected(queries_, features.orb, features.grid, {.max_distance = 50, .ratio = 1.f, .check_rotation = false}, matches_);
+  for (const Match& m : matches_) {
+    const auto q = static_cast<std::size_t>(m.query);
+    const auto f = static_cast<std::size_t>(m.feature);
+    const PointObservation o = model.observation(features, f);
+    if ((camera.project(in_camera[q]) - o.pixel).squaredNorm() * o.inverse_variance_px > 5.991) continue;
+    if (o.disparity_px > 0) {
+      const double residual = o.disparity_px - model.intrinsics().focal_baseline_px_m / in_camera[q].z();
+      if (residual * residual * o.inverse_variance_disparity > 6.63) continue;
+    }
+    const LandmarkId existing = key_frame.landmarks[f];
+    if (!existing.valid()) {
+      map_.add_observation(sources[q], target, static_cast<std::uint32_t>(f));
+      continue;
+    }
+    const Landmark* a = map_.landmark(sources[q]);
+    const Landmark* b = map_.landmark(existing);
+    if (a == nullptr || a == b) continue;
+    // The one that more key frames know survives.
+    if (a->observations.size() > b->observations.size()) map_.fuse_landmarks(existing, sources[q]);
+    else map_.fuse_landmarks(sources[q], existing);
+  }
+}
+
+void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
+  std::vector<KeyFrameId> window{id};
+  for (const Covisible& c : map_.covisible(id, options_.min_shared)) {
+    if (window.size() >= static_cast<std::size_t>(options_.bundle_key_frames)) break;
+    window.push_back(c.key_frame);
+  }
+  std::vector<LandmarkId> landmarks;
+  for (const KeyFrameId k : window)
+    for (const LandmarkId l : map_.key_frame(k)->landmarks)
+      if (l.valid()) landmarks.push_back(l);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+
+  // Key frames outside the window that see its landmarks hold the window in place; those that see most are taken.
+  std::map<KeyFrameId, int> outside;
+  for (const LandmarkId l : landmarks)
+    for (const Observation& o : map_.landmark(l)->observations)
+      if (std::find(window.begin(), window.end(), o.key_frame) == window.end()) ++outside[o.key_frame];
+  std::vector<std::pair<int, KeyFrameId>> ranked;
+  for (const auto& [key_frame, count] : outside) ranked.emplace_back(count, key_frame);
+  std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second > b.second; });
+  if (ranked.size() > static_cast<std::size_t>(options_.bundle_fixed_key_frames)) ranked.resize(static_cast<std::size_t>(options_.bundle_fixed_key_frames));
+
+  BaProblem problem;
+  problem.camera = map_.model().intrinsics();
+  std::map<KeyFrameId, std::uint32_t> index_of;
+  const KeyFrameId oldest = map_.key_frames().begin()->first;
+  const auto add_pose = [&](KeyFrameId k, bool fixed) {
+    index_of[k] = static_cast<std::uint32_t>(problem.poses.size());
+    problem.poses.push_back(map_.key_frame(k)->camera_from_world);
+    problem.pose_fixed.push_back(fixed ? 1 : 0);
+  };
+  for (const KeyFrameId k : window) add_pose(k, k == oldest || (ranked.empty() && k == *std::min_element(window.begin(), window.end())));
+  for (const auto& [count, k] : ranked) add_pose(k, true);
+  std::vector<Observation> edge_source;
+  std::vector<LandmarkId> edge_landmark;
+  for (const LandmarkId l : landmarks) {
+    const Landmark& landmark = *map_.landmark(l);
+    const auto point = static_cast<std::uint32_t>(problem.points.size());
+    problem.points.push_back(landmark.position);
+    for (const Observation& o : landmark.observations) {
+      const auto it = index_of.find(o.key_frame);
+      if (it == index_of.end()) continue;
+      problem.edges.push_back({it->second, point, map_.model().observation(*map_.key_frame(o.key_frame)->features, o.feature)});
+      edge_source.push_back(o);
+      edge_landmark.push_back(l);
+    }
+  }
+  std::vector<std::uint8_t> edge_inlier;
+  const BaSummary summary = adjust_bundle(problem, {}, edge_inlier, stop);
+  if (!summary.usable) return;
+  for (const KeyFrameId k : window) map_.set_pose(k, problem.poses[index_of.at(k)]);
+  for (std::size_t i = 0; i < landmarks.size(); ++i) map_.set_position(landmarks[i], problem.points[i]);
+  for (std::size_t e = 0; e < edge_inlier.size(); ++e)
+    if (!edge_inlier[e]) map_.remove_observation(edge_landmark[e], edge_source[e].key_frame);
+  for (const LandmarkId l : landmarks)
+    if (map_.landmark(l) != nullptr) map_.refresh_geometry(l);
+}
+
+bool Mapper::is_redundant(const KeyFrame& key_frame) const {
+  int seen = 0, redundant = 0;
+  for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i) {
+    if (!key_frame.landmarks[i].valid()) continue;
+    const Landmark& landmark = *map_.landmark(key_frame.landmarks[i]);
+    ++seen;
+    if (landmark.observations.size() <= 3) continue;
+    int others = 0;
+    for (const Observation& o : landmark.observations) {
+      if (o.key_frame == key_frame.id) continue;
+      // An observation on a coarser level is no full substitute.
+      if (map_.key_frame(o.key_frame)->features->orb.keypoints[o.feature].level <= key_frame.features->orb.keypoints[i].level + 1) ++others;
+      if (others >= 3) break;
+    }
+    redundant += others >= 3;
+  }
+  return redundant > options_.redundant_ratio * seen;
+}
+
+void Mapper::cull_key_frames(KeyFrameId newest) {
+  const KeyFrameId oldest = map_.key_frames().begin()->first;
+  for (const Covisible& c : map_.covisible(newest, options_.min_shared)) {
+    if (c.key_frame == oldest || c.key_frame == newest) continue;
+    if (!is_redundant(*map_.key_frame(c.key_frame))) continue;
+    const std::vector<Covisible> neighbours = map_.covisible(c.key_frame, 1);
+    map_.remove_key_frame(c.key_frame, neighbours.empty() ? newest : neighbours.front().key_frame);
+  }
+}
+
+}  // namespace semvslam

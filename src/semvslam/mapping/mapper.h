@@ -1,0 +1,74 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "semvslam/feature/matching.h"
+#include "semvslam/map/local_map.h"
+#include "semvslam/map/map.h"
+#include "semvslam/solve/bundle_adjustment.h"
+
+namespace semvslam {
+
+struct MappingOptions {
+  double max_landmark_depth_m = 6.0;    // landmarks are made from depth up to here
+  double min_found_ratio = 0.25;        // found / visible below which a young landmark goes
+  int young_key_frames = 3;             // a landmark must have three observations after so many key frames
+  int fuse_key_frames = 12;             // neighbours in which the new key frame's landmarks are searched, and vice versa
+  double fuse_radius_px = 3;            // at level 0
+  int bundle_key_frames = 10;           // optimised in a local bundle adjustment
+  int bundle_fixed_key_frames = 20;     // that hold it in place
+  int min_shared = 15;                  // landmarks that make two key frames neighbours
+  double redundant_ratio = 0.9;         // a key frame goes when this share of its landmarks is seen in three others
+  LocalMapOptions local_map;
+};
+
+/// A key frame as tracking saw it, ready to be put into the map.
+struct NewKeyFrame {
+  FrameId frame;
+  TimeStamp stamp;
+  SE3 camera_from_world;
+  std::shared_ptr<const FrameFeatures> features;
+  std::vector<LandmarkId> landmarks;  // per feature; invalid = none; ids may be out of date
+};
+
+/// Milliseconds of one mapping step, by part.
+struct MappingTimes {
+  double create_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
+};
+
+/// The one writer of the map: takes key frames in, makes, fuses, adjusts and culls. Every step works on a bounded
+/// neighbourhood of the new key frame. No threads inside; the same calls give the same map.
+class Mapper {
+ public:
+  Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model);
+
+  /// @return the snapshot that tracking goes on with.
+  std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});
+  void count_visible(LandmarkId id, int visible, int found) { map_.count_visible(id, visible, found); }
+
+  const Map& map() const { return map_; }
+  const MappingTimes& times() const { return times_; }
+
+ private:
+  KeyFrameId insert(const NewKeyFrame& key_frame);
+  void create_landmarks(KeyFrameId id);
+  void cull_landmarks(KeyFrameId newest);
+  std::vector<KeyFrameId> fusion_partners(KeyFrameId id) const;
+  void fuse_with_neighbours(KeyFrameId id);
+  /// Searches landmarks in a key frame's image; adds observations and fuses duplicates.
+  void fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target);
+  void adjust_neighbourhood(KeyFrameId id, std::stop_token stop);
+  void cull_key_frames(KeyFrameId newest);
+  bool is_redundant(const KeyFrame& key_frame) const;
+
+  MappingOptions options_;
+  Map map_;
+  MappingTimes times_;
+  std::vector<LandmarkId> young_;  // ascending
+  std::vector<ProjectedQuery> queries_;
+  std::vector<Match> matches_;
+};
+
+}  // namespace semvslam

@@ -1,0 +1,230 @@
+#include "semvslam/pipeline/slam.h"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "semvslam/base/bounded_queue.h"
+
+namespace semvslam {
+
+// Ownership: the tracker belongs to the thread of process(), the mapper to the mapping stage (its own thread, or the calling
+// one when deterministic). Between them: a bounded queue of requests one way, a slot with the newest local map the other.
+struct Slam::Impl {
+  Impl(const Config& c, const Camera& camera)
+      : config(c),
+        model(std::make_shared<ObservationModel>(camera, c.noise, level_scales(c.orb))),
+        tracker(c.tracking, c.orb, model),
+        mapper(c.mapping, model),
+        requests(static_cast<std::size_t>(c.mapping_queue)) {}
+
+  void map_key_frame(KeyFrameRequest request);
+  void run_mapping();
+  void submit(KeyFrameRequest request);
+  std::shared_ptr<const LocalMap> newest_map() const {
+    std::lock_guard lock(slot_mutex);
+    return newest;
+  }
+  void wait_for_first_map() {
+    std::unique_lock lock(slot_mutex);
+    published.wait(lock, [&] { return newest != nullptr || failure != nullptr; });
+  }
+  Status failure_status() const;
+
+  const Config config;
+  const std::shared_ptr<const ObservationModel> model;
+  Tracker tracker;
+  StageTimers timers;
+  std::vector<std::shared_ptr<Sink>> sinks;
+
+  mutable std::mutex map_mutex;  // a query never sees half a mapping step
+  Mapper mapper;
+
+  BoundedQueue<KeyFrameRequest> requests;  // blocks when full, unless realtime: then the tracker asks again later
+  mutable std::mutex slot_mutex;
+  std::condition_variable published;
+  std::shared_ptr<const LocalMap> newest;
+  std::exception_ptr failure;
+  std::jthread mapping_thread;
+
+  struct Record {
+    TimeStamp stamp;
+    RelativePose relative;
+  };
+  mutable std::mutex record_mutex;
+  std::vector<Record> records;
+  std::uint64_t frames = 0, lost = 0;
+  FrameId next_frame{0};
+};
+
+void Slam::Impl::map_key_frame(KeyFrameRequest request) {
+  std::shared_ptr<const LocalMap> local;
+  {
+    std::lock_guard lock(map_mutex);
+    NewKeyFrame key_frame{request.frame, request.stamp, {}, std::move(request.features), std::move(request.landmarks)};
+    if (request.reference.valid())
+      key_frame.camera_from_world = request.camera_from_reference * mapper.map().camera_from_world(request.reference).value();
+    for (const LandmarkUse& use : request.uses) mapper.count_visible(use.landmark, use.visible, use.found);
+    local = mapper.step(key_frame);
+    const MappingTimes& t = mapper.times();
+    timers["mapping.create"].add_ms(t.create_ms);
+    timers["mapping.fuse"].add_ms(t.fuse_ms);
+    timers["mapping.bundle"].add_ms(t.bundle_ms);
+    timers["mapping.cull"].add_ms(t.cull_ms);
+    timers["mapping"].add_ms(t.total_ms);
+  }
+  {
+    std::lock_guard lock(slot_mutex);
+    newest = std::move(local);
+  }
+  published.notify_all();
+}
+
+void Slam::Impl::run_mapping() {
+  try {
+    while (std::optional<KeyFrameRequest> request = requests.pop()) map_key_frame(std::move(*request));
+  } catch (...) {
+    {
+      std::lock_guard lock(slot_mutex);
+      failure = std::current_exception();
+    }
+    requests.close();
+    published.notify_all();
+  }
+}
+
+void Slam::Impl::submit(KeyFrameRequest request) {
+  const bool first = !request.reference.valid();
+  if (config.deterministic) {
+    map_key_frame(std::move(request));
+  } else {
+    if (!mapping_thread.joinable()) mapping_thread = std::jthread([this] { run_mapping(); });
+    requests.push(std::move(request));
+    // Nothing can be tracked before there is a map, and the first one takes a millisecond.
+    if (first) wait_for_first_map();
+  }
+}
+
+Status Slam::Impl::failure_status() const {
+  std::lock_guard lock(slot_mutex);
+  if (!failure) return Status::success();
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, fmt::format("mapping stopped: {}", e.what())};
+  }
+}
+
+Slam::Slam(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Slam::~Slam() {
+  impl_->requests.close();
+  if (impl_->mapping_thread.joinable()) impl_->mapping_thread.join();
+}
+
+Result<std::unique_ptr<Slam>> Slam::create(const Config& config, const Camera& camera) {
+  if (Status s = camera.check(); !s) return s.error();
+  return std::unique_ptr<Slam>(new Slam(std::make_unique<Impl>(config, camera)));
+}
+
+void Slam::add_sink(std::shared_ptr<Sink> sink) { impl_->sinks.push_back(std::move(sink)); }
+
+Result<TrackResult> Slam::process(const RgbdFrame& input) {
+  Impl& s = *impl_;
+  const Camera& camera = s.model->camera();
+  const cv::Size size(camera.width_px, camera.height_px);
+  const auto invalid = [&](const std::string& what) { return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", s.next_frame.value, what)}; };
+  if (input.gray.type() != CV_8UC1 || input.gray.size() != size)
+    return invalid(fmt::format("the grey image must be 8-bit and {}x{}, it is {}x{}", size.width, size.height, input.gray.cols, input.gray.rows));
+  if (!input.depth.empty() && (input.depth.size() != size || (input.depth.type() != CV_16UC1 && input.depth.type() != CV_32FC1)))
+    return invalid(fmt::format("the depth image must be 16-bit or float and {}x{}, it is {}x{}", size.width, size.height, input.depth.cols, input.depth.rows));
+  if (!input.mask.empty() && (input.mask.size() != size || input.mask.type() != CV_8UC1))
+    return invalid(fmt::format("the mask must be 8-bit and {}x{}, it is {}x{}", size.width, size.height, input.mask.cols, input.mask.rows));
+  if (Status status = s.failure_status(); !status) return status.error();
+
+  RgbdFrame frame = input;
+  frame.id = s.next_frame;
+  s.next_frame.value += 1;
+  const bool may_request = !s.config.realtime || s.requests.size() < static_cast<std::size_t>(s.config.mapping_queue);
+  Tracker::Output tracked = s.tracker.step(frame, s.newest_map(), may_request);
+  s.timers["tracking.extract"].add_ms(tracked.times.extract_ms);
+  s.timers["tracking.motion"].add_ms(tracked.times.motion_ms);
+  s.timers["tracking.local_map"].add_ms(tracked.times.local_map_ms);
+  s.timers["tracking"].add_ms(tracked.times.total_ms);
+
+  TrackResult result;
+  result.frame = frame.id;
+  result.stamp = frame.stamp;
+  result.state = tracked.state;
+  result.world_from_camera = tracked.camera_from_world.inverse();
+  result.inliers = tracked.inliers;
+  result.is_key_frame = tracked.key_frame.has_value();
+  result.mask_source = frame.mask.empty() ? MaskSource::kNone : MaskSource::kGiven;
+  result.tracking_ms = tracked.times.total_ms;
+  if (tracked.key_frame) s.submit(std::move(*tracked.key_frame));
+  if (tracked.state == TrackingState::kTracking && !tracked.relative) {
+    if (const auto local = s.newest_map()) tracked.relative = RelativePose{local->reference, SE3()};
+  }
+  {
+    std::lock_guard lock(s.record_mutex);
+    ++s.frames;
+    if (tracked.state == TrackingState::kLost) ++s.lost;
+    if (tracked.relative) s.records.push_back({frame.stamp, *tracked.relative});
+  }
+  for (const auto& sink : s.sinks) sink->on_frame(frame, result);
+  return result;
+}
+
+Status Slam::finish() {
+  impl_->requests.close();
+  if (impl_->mapping_thread.joinable()) impl_->mapping_thread.join();
+  return impl_->failure_status();
+}
+
+Trajectory Slam::trajectory() const {
+  std::scoped_lock lock(impl_->map_mutex, impl_->record_mutex);
+  Trajectory trajectory;
+  trajectory.reserve(impl_->records.size());
+  for (const Impl::Record& r : impl_->records) {
+    const SE3 reference = impl_->mapper.map().camera_from_world(r.relative.reference).value();
+    trajectory.push_back({r.stamp, (r.relative.camera_from_reference * reference).inverse()});
+  }
+  return trajectory;
+}
+
+Trajectory Slam::key_frame_trajectory() const {
+  std::lock_guard lock(impl_->map_mutex);
+  Trajectory trajectory;
+  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames()) trajectory.push_back({key_frame.stamp, key_frame.camera_from_world.inverse()});
+  return trajectory;
+}
+
+std::vector<Eigen::Vector3d> Slam::landmark_positions() const {
+  std::lock_guard lock(impl_->map_mutex);
+  std::vector<Eigen::Vector3d> positions;
+  for (const LandmarkId id : impl_->mapper.map().landmark_ids()) positions.push_back(impl_->mapper.map().landmark(id)->position);
+  return positions;
+}
+
+SlamStatistics Slam::statistics() const {
+  std::scoped_lock lock(impl_->map_mutex, impl_->record_mutex);
+  SlamStatistics statistics;
+  statistics.frames = impl_->frames;
+  statistics.tracked = impl_->records.size();
+  statistics.lost = impl_->lost;
+  statistics.key_frames = impl_->mapper.map().key_frames().size();
+  statistics.landmarks = impl_->mapper.map().landmark_count();
+  statistics.stages = impl_->timers.summaries();
+  return statistics;
+}
+
+const Config& Slam::effective_config() const { return impl_->config; }
+
+Status Slam::check_invariants() const {
+  std::lock_guard lock(impl_->map_mutex);
+  return impl_->mapper.map().check_invariants();
+}
+
+}  // namespace semvslam

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "semvslam/base/ids.h"
+#include "semvslam/base/time_stamp.h"
+#include "semvslam/geometry/se3.h"
+#include "semvslam/map/frame_features.h"
+
+namespace semvslam {
+
+enum class TrackingState { kInitializing, kTracking, kLost };
+
+/// How a landmark fared since the last key frame: in how many frames it should have been seen, in how many it was.
+struct LandmarkUse {
+  LandmarkId landmark;
+  int visible = 0, found = 0;
+};
+
+/// What tracking asks of mapping: keep this frame.
+struct KeyFrameRequest {
+  FrameId frame;
+  TimeStamp stamp;
+  std::shared_ptr<const FrameFeatures> features;
+  std::vector<LandmarkId> landmarks;   // per feature; invalid = none
+  KeyFrameId reference;                // invalid for the first key frame of a map
+  SE3 camera_from_reference;           // stays true when mapping moves the reference meanwhile
+  std::vector<LandmarkUse> uses;       // since the previous request
+};
+
+/// The pose of a frame relative to the key frame that it was tracked against.
+struct RelativePose {
+  KeyFrameId reference;
+  SE3 camera_from_reference;
+};
+
+}  // namespace semvslam

@@ -1,0 +1,310 @@
+#include "semvslam/tracking/tracker.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace semvslam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
+
+bool inside(const Camera& camera, const Eigen::Vector2d& pixel) {
+  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width_px && pixel.y() < camera.height_px;
+}
+
+constexpr double kNearestProjection_m = 0.05;
+
+}  // namespace
+
+void Tracker::Candidates::clear() {
+  points.clear();
+  observations.clear();
+  features.clear();
+  landmarks.clear();
+}
+
+Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, std::shared_ptr<const ObservationModel> model)
+    : options_(options), model_(std::move(model)), extractor_(orb) {}
+
+Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const LocalMap> local, bool may_request) {
+  const Clock::time_point start = Clock::now();
+  Output output;
+  current_ = Tracked{std::make_shared<FrameFeatures>(), {}, {}};
+  extractor_.extract(frame.gray, frame.mask, current_.features->orb);
+  measure(*model_, frame.depth, *current_.features);
+  current_.landmarks.assign(current_.features->size(), LandmarkId());
+  output.times.extract_ms = ms_since(start);
+
+  if (!local) {
+    TrackingTimes times = output.times;
+    if (!waiting_for_map_) output = initialise(frame);
+    times.total_ms = ms_since(start);
+    output.times = times;
+    return output;
+  }
+
+  adopt(std::move(local));
+  const Clock::time_point motion_start = Clock::now();
+  bool ok = false;
+  if (last_.features) {
+    if (has_velocity_) ok = track_motion(velocity_ * last_.camera_from_world, 1.0) || track_motion(velocity_ * last_.camera_from_world, 2.5);
+    if (!ok) ok = track_motion(last_.camera_from_world, has_velocity_ ? 4.0 : 2.0);
+  }
+  if (!ok) ok = track_descriptors();
+  output.times.motion_ms = ms_since(motion_start);
+
+  const Clock::time_point local_start = Clock::now();
+  output.inliers = ok ? track_local_map() : 0;
+  ok = output.inliers >= options_.min_inliers;
+  output.times.local_map_ms = ms_since(local_start);
+
+  if (ok) {
+    output.state = TrackingState::kTracking;
+    output.camera_from_world = current_.camera_from_world;
+    const SE3 reference = local_->find(local_->reference)->camera_from_world;
+    last_relative_ = output.relative = RelativePose{local_->reference, current_.camera_from_world * reference.inverse()};
+    has_velocity_ = last_.features != nullptr;
+    if (has_velocity_) velocity_ = current_.camera_from_world * last_.camera_from_world.inverse();
+    if (may_request && wants_key_frame(output.inliers, frame.id)) output.key_frame = make_request(frame);
+    last_ = std::move(current_);
+  } else {
+    output.state = TrackingState::kLost;
+    output.camera_from_world = last_.camera_from_world;
+    has_velocity_ = false;  // the last frame stays what the next one is matched against
+  }
+  output.times.total_ms = ms_since(start);
+  return output;
+}
+
+Tracker::Output Tracker::initialise(const RgbdFrame& frame) {
+  Output output;
+  int with_depth = 0;
+  for (std::size_t i = 0; i < current_.features->size(); ++i) with_depth += current_.features->has_depth(i);
+  if (with_depth < options_.min_initial_points) return output;
+  output.state = TrackingState::kTracking;
+  output.inliers = with_depth;
+  output.key_frame = make_request(frame);
+  waiting_for_map_ = true;
+  last_ = std::move(current_);
+  last_relative_.reset();
+  return output;
+}
+
+void Tracker::adopt(std::shared_ptr<const LocalMap> local) {
+  if (local == local_) return;
+  local_ = std::move(local);
+  if (!last_.features) return;
+  if (last_relative_) {
+    if (const LocalMap::KeyFramePose* reference = local_->find(last_relative_->reference))
+      last_.camera_from_world = last_relative_->camera_from_reference * reference->camera_from_world;
+  }
+  for (LandmarkId& id : last_.landmarks) {
+    if (!id.valid()) continue;
+    const auto it = std::lower_bound(local_->fused.begin(), local_->fused.end(), std::pair(id, LandmarkId(0)));
+    if (it != local_->fused.end() && it->first == id) id = it->second;
+  }
+}
+
+bool Tracker::track_motion(const SE3& predicted, double radius_factor) {
+  const Camera& camera = model_->camera();
+  const FrameFeatures& last = *last_.features;
+  const SE3 world_from_last = last_.camera_from_world.inverse();
+  queries_.clear();
+  query_source_.clear();
+  std::vector<Eigen::Vector3d>& points = candidates_.points;
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(last.size());
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    Eigen::Vector3d in_world;
+    if (const LocalMap::Point* point = last_.landmarks[i].valid() ? local_->find(last_.landmarks[i]) : nullptr)
+      in_world = point->position;
+    else if (last.has_depth(i))
+      in_world = world_from_last * model_->back_project(last, i);
+    else
+      continue;
+    const Eigen::Vector3d in_camera = predicted * in_world;
+    if (in_camera.z() < kNearestProjection_m) continue;
+    const Eigen::Vector2d pixel = camera.project(in_camera);
+    if (!inside(camera, pixel)) continue;
+    const Keypoint& keypoint = last.orb.keypoints[i];
+    const float radius = static_cast<float>(options_.motion_radius_px * radius_factor) * model_->level_scale(keypoint.level);
+    queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, keypoint.level - 1,
+                        keypoint.level + 1, last.orb.descriptors[i], keypoint.angle_rad});
+    query_source_.push_back(static_cast<int>(i));
+    positions.push_back(in_world);
+  }
+  match_projected(queries_, current_.features->orb, current_.features->grid,
+                  {.max_distance = options_.max_distance_bits, .ratio = 0.9f, .check_rotation = true}, matches_);
+  candidates_.clear();
+  for (const Match& m : matches_) {
+    const int source = query_source_[static_cast<std::size_t>(m.query)];
+    points.push_back(positions[static_cast<std::size_t>(m.query)]);
+    candidates_.observations.push_back(model_->observation(*current_.features, static_cast<std::size_t>(m.feature)));
+    candidates_.features.push_back(m.feature);
+    const LandmarkId id = last_.landmarks[static_cast<std::size_t>(source)];
+    candidates_.landmarks.push_back(id.valid() && local_->find(id) ? id : LandmarkId());
+  }
+  SE3 pose = predicted;
+  const int inliers = estimate_pose(candidates_, pose);
+  if (inliers < options_.min_inliers) return false;
+  current_.camera_from_world = pose;
+  return true;
+}
+
+bool Tracker::track_descriptors() {
+  // Last resort when prediction fails: the previous frame's points against the whole image, by descriptor alone.
+  if (!last_.features) return false;
+  const FrameFeatures& last = *last_.features;
+  const SE3 world_from_last = last_.camera_from_world.inverse();
+  match_brute_force(last.orb.descriptors, current_.features->orb.descriptors, {.max_distance = 50, .ratio = 0.8f}, matches_);
+  candidates_.clear();
+  for (const Match& m : matches_) {
+    const auto i = static_cast<std::size_t>(m.query);
+    const LocalMap::Point* point = last_.landmarks[i].valid() ? local_->find(last_.landmarks[i]) : nullptr;
+    if (!point && !last.has_depth(i)) continue;
+    candidates_.points.push_back(point ? point->position : world_from_last * model_->back_project(last, i));
+    candidates_.observations.push_back(model_->observation(*current_.features, static_cast<std::size_t>(m.feature)));
+    candidates_.features.push_back(m.feature);
+    candidates_.landmarks.push_back(point ? point->id : LandmarkId());
+  }
+  SE3 pose = last_.camera_from_world;
+  if (estimate_pose(candidates_, pose) < options_.min_inliers) return false;
+  current_.camera_from_world = pose;
+  return true;
+}
+
+int Tracker::estimate_pose(Candidates& candidates, SE3& camera_from_world) {
+  if (candidates.points.size() < 10) return 0;
+  const PoseEstimate estimate = optimize_pose(model_->intrinsics(), camera_from_world, candidates.points,
+                                              candidates.observations, {}, inlier_);
+  camera_from_world = estimate.camera_from_world;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates.points.size(); ++i) {
+    if (!inlier_[i]) continue;
+    candidates.points[kept] = candidates.points[i];
+    candidates.observations[kept] = candidates.observations[i];
+    candidates.features[kept] = candidates.features[i];
+    candidates.landmarks[kept] = candidates.landmarks[i];
+    ++kept;
+  }
+  candidates.points.resize(kept);
+  candidates.observations.resize(kept);
+  candidates.features.resize(kept);
+  candidates.landmarks.resize(kept);
+  return estimate.inliers;
+}
+
+int Tracker::track_local_map() {
+  const Camera& camera = model_->camera();
+  const SE3& pose = current_.camera_from_world;
+  const Eigen::Vector3d centre = pose.inverse().translation();
+  std::vector<LandmarkId> visible, found;
+  // What frame-to-frame matching found stays; its landmarks and features are not searched again.
+  std::vector<std::uint8_t> feature_taken(current_.features->size(), 0);
+  std::vector<LandmarkId> known;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates_.points.size(); ++i) {
+    const LandmarkId id = candidates_.landmarks[i];
+    if (!id.valid()) continue;  // temporary points served for the prediction; a landmark may take their feature now
+    feature_taken[static_cast<std::size_t>(candidates_.features[i])] = 1;
+    known.push_back(id);
+    candidates_.points[kept] = candidates_.points[i];
+    candidates_.observations[kept] = candidates_.observations[i];
+    candidates_.features[kept] = candidates_.features[i];
+    candidates_.landmarks[kept] = id;
+    ++kept;
+  }
+  candidates_.points.resize(kept);
+  candidates_.observations.resize(kept);
+  candidates_.features.resize(kept);
+  candidates_.landmarks.resize(kept);
+  std::sort(known.begin(), known.end());
+
+  queries_.clear();
+  query_source_.clear();
+  for (std::size_t k = 0; k < local_->points.size(); ++k) {
+    const LocalMap::Point& point = local_->points[k];
+    const Eigen::Vector3d in_camera = pose * point.position;
+    if (in_camera.z() < kNearestProjection_m) continue;
+    const Eigen::Vector2d pixel = camera.project(in_camera);
+    if (!inside(camera, pixel)) continue;
+    const Eigen::Vector3d ray = point.position - centre;
+    const auto distance = static_cast<float>(ray.norm());
+    if (distance < 0.8f * point.min_distance_m || distance > 1.2f * point.max_distance_m) continue;
+    const double cosine = ray.dot(point.normal.cast<double>()) / distance;
+    if (cosine < options_.min_view_cosine) continue;
+    visible.push_back(point.id);
+    if (std::binary_search(known.begin(), known.end(), point.id)) continue;
+    const int level = model_->predict_level(point.max_distance_m / distance);
+    const float radius = static_cast<float>(options_.local_map_radius_px) * model_->level_scale(level);
+    queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, level - 1, level + 1,
+                        point.descriptor, -1.f});
+    query_source_.push_back(static_cast<int>(k));
+  }
+  match_projected(queries_, current_.features->orb, current_.features->grid,
+                  {.max_distance = options_.max_distance_bits, .ratio = 0.8f, .check_rotation = false}, matches_);
+  for (const Match& m : matches_) {
+    if (feature_taken[static_cast<std::size_t>(m.feature)]) continue;
+    const LocalMap::Point& point = local_->points[static_cast<std::size_t>(query_source_[static_cast<std::size_t>(m.query)])];
+    candidates_.points.push_back(point.position);
+    candidates_.observations.push_back(model_->observation(*current_.features, static_cast<std::size_t>(m.feature)));
+    candidates_.features.push_back(m.feature);
+    candidates_.landmarks.push_back(point.id);
+  }
+  SE3 refined = pose;
+  const int inliers = estimate_pose(candidates_, refined);
+  if (inliers < options_.min_inliers) return inliers;
+  current_.camera_from_world = refined;
+  for (std::size_t i = 0; i < candidates_.points.size(); ++i) {
+    current_.landmarks[static_cast<std::size_t>(candidates_.features[i])] = candidates_.landmarks[i];
+    found.push_back(candidates_.landmarks[i]);
+  }
+  count_uses(visible, found);
+  return inliers;
+}
+
+void Tracker::count_uses(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found) {
+  for (const LandmarkId id : visible) ++uses_[id].visible;
+  for (const LandmarkId id : found) {
+    LandmarkUse& use = uses_[id];
+    ++use.found;
+    use.visible = std::max(use.visible, use.found);
+  }
+}
+
+bool Tracker::wants_key_frame(int inliers, FrameId frame) const {
+  const int since = static_cast<int>(frame.value - last_key_frame_.value);
+  if (since < options_.min_frames_between) return false;
+  int tracked_close = 0, new_close = 0;
+  for (std::size_t i = 0; i < current_.features->size(); ++i) {
+    const float depth = current_.features->depth_m[i];
+    if (depth <= 0.f || depth > options_.close_depth_m) continue;
+    (current_.landmarks[i].valid() ? tracked_close : new_close) += 1;
+  }
+  const bool needs_close = tracked_close < options_.min_tracked_close && new_close > options_.min_new_close;
+  const bool weak = inliers < options_.key_frame_ratio * local_->reference_matches || needs_close;
+  return since >= options_.max_frames_between || weak;
+}
+
+KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
+  KeyFrameRequest request;
+  request.frame = frame.id;
+  request.stamp = frame.stamp;
+  request.features = current_.features;
+  request.landmarks = current_.landmarks;
+  if (last_relative_) {
+    request.reference = last_relative_->reference;
+    request.camera_from_reference = last_relative_->camera_from_reference;
+  }
+  request.uses.reserve(uses_.size());
+  for (const auto& [id, use] : uses_) request.uses.push_back({id, use.visible, use.found});
+  std::sort(request.uses.begin(), request.uses.end(), [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
+  uses_.clear();
+  last_key_frame_ = frame.id;
+  return request;
+}
+
+}  // namespace semvslam
