@@ -18,7 +18,8 @@ Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points) {
 
 }  // namespace
 
-Result<Alignment> align_points(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b, bool with_scale) {
+Result<Alignment> align_points(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
+                               bool with_scale) {
   if (a.size() != b.size()) return refuse(fmt::format("{} and {} points cannot be paired", a.size(), b.size()));
   if (a.size() < 3) return refuse(fmt::format("at least 3 pairs are needed, got {}", a.size()));
   for (std::size_t i = 0; i < a.size(); ++i)

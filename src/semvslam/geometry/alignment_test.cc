@@ -95,7 +95,8 @@ TEST(Alignment, PlanarPointsAreEnough) {
 
 TEST(Alignment, RefusesWhatHasNoAnswer) {
   const Points three = random_points(3, 7);
-  EXPECT_FALSE(align_points(Points(three.begin(), three.begin() + 2), Points(three.begin(), three.begin() + 2), false).ok());
+  EXPECT_FALSE(
+      align_points(Points(three.begin(), three.begin() + 2), Points(three.begin(), three.begin() + 2), false).ok());
   EXPECT_FALSE(align_points(three, random_points(4, 8), false).ok());
   EXPECT_FALSE(align_points(Points(5, three[0]), Points(5, three[0]), false).ok());
   Points line;

@@ -18,14 +18,14 @@ struct BaProblem {
   };
   Intrinsics camera;
   std::vector<SE3> poses;
-  std::vector<std::uint8_t> pose_fixed;     // 1 = constant; at least one must be, or the gauge floats
-  std::vector<Eigen::Vector3d> points;      // world, metres
-  std::vector<Edge> edges;                  // any order; a (pose, point) pair at most once
+  std::vector<std::uint8_t> pose_fixed;  // 1 = constant; at least one must be, or the gauge floats
+  std::vector<Eigen::Vector3d> points;   // world, metres
+  std::vector<Edge> edges;               // any order; a (pose, point) pair at most once
 };
 
 struct BaOptions {
-  int robust_iterations = 5;     // first pass, Huber loss
-  int final_iterations = 5;      // second pass, edges over the chi^2 limits left out
+  int robust_iterations = 5;  // first pass, Huber loss
+  int final_iterations = 5;   // second pass, edges over the chi^2 limits left out
   double chi2_pixel = 5.991;
   double chi2_disparity = 3.841;
   double relative_cost_tolerance = 1e-4;  // a pass ends when an accepted step gains less than this share
@@ -35,8 +35,8 @@ struct BaSummary {
   double initial_cost = 0, final_cost = 0;
   int iterations = 0, accepted_steps = 0;
   int outlier_edges = 0;
-  bool stopped = false;   // by the stop token: the state is the best so far
-  bool usable = true;     // false: numerically impossible, nothing was changed
+  bool stopped = false;  // by the stop token: the state is the best so far
+  bool usable = true;    // false: numerically impossible, nothing was changed
   double seconds = 0;
   std::string brief() const;
 };
