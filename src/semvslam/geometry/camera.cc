@@ -15,6 +15,19 @@ Eigen::Vector2d apply(const BrownDistortion& d, const Eigen::Vector2d& n) {
           y * radial + d.p1 * (r2 + 2 * y * y) + 2 * d.p2 * x * y};
 }
 
+// d(apply)/d(n); symmetric off the diagonal.
+Eigen::Matrix2d derivative(const BrownDistortion& d, const Eigen::Vector2d& n) {
+  const double x = n.x(), y = n.y();
+  const double r2 = x * x + y * y;
+  const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * d.k3));
+  const double by_r2 = d.k1 + r2 * (2 * d.k2 + r2 * 3 * d.k3);
+  const double mixed = 2 * x * y * by_r2 + 2 * d.p1 * x + 2 * d.p2 * y;
+  Eigen::Matrix2d j;
+  j << radial + 2 * x * x * by_r2 + 2 * d.p1 * y + 6 * d.p2 * x, mixed, mixed,
+      radial + 2 * y * y * by_r2 + 6 * d.p1 * y + 2 * d.p2 * x;
+  return j;
+}
+
 }  // namespace
 
 Eigen::Vector2d Camera::distort(const Eigen::Vector2d& ideal) const {
@@ -27,10 +40,17 @@ Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& recorded) const {
   if (distortion.is_zero()) return recorded;
   const Eigen::Vector2d target((recorded.x() - cx_px) / fx_px, (recorded.y() - cy_px) / fy_px);
   Eigen::Vector2d n = target;
-  for (int i = 0; i < 20; ++i) {
-    const Eigen::Vector2d step = target - apply(distortion, n);
+  double error = (target - apply(distortion, n)).squaredNorm();
+  for (int i = 0; i < 20 && error > 1e-24; ++i) {
+    Eigen::Vector2d step = derivative(distortion, n).inverse() * (target - apply(distortion, n));
+    double next_error = (target - apply(distortion, n + step)).squaredNorm();
+    while (!(next_error < error) && step.squaredNorm() > 1e-26) {
+      step *= 0.5;
+      next_error = (target - apply(distortion, n + step)).squaredNorm();
+    }
+    if (!(next_error < error)) break;
     n += step;
-    if (step.squaredNorm() < 1e-18) break;
+    error = next_error;
   }
   return {fx_px * n.x() + cx_px, fy_px * n.y() + cy_px};
 }
@@ -45,7 +65,8 @@ Status Camera::check() const {
     return bad(fmt::format("principal point ({}, {}) lies outside the {}x{} image", cx_px, cy_px, width_px, height_px));
   if (!(std::isfinite(depth_units_per_m) && depth_units_per_m > 0))
     return bad(fmt::format("depth_units_per_m must be positive, got {}", depth_units_per_m));
-  if (!(std::isfinite(baseline_m) && baseline_m > 0)) return bad(fmt::format("baseline_m must be positive, got {}", baseline_m));
+  if (!(std::isfinite(baseline_m) && baseline_m > 0))
+    return bad(fmt::format("baseline_m must be positive, got {}", baseline_m));
   if (!(std::isfinite(frame_rate_hz) && frame_rate_hz > 0))
     return bad(fmt::format("frame_rate_hz must be positive, got {}", frame_rate_hz));
   const BrownDistortion& d = distortion;

@@ -21,7 +21,7 @@ struct Camera {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   BrownDistortion distortion;
   double depth_units_per_m = 5000;  // of 16-bit depth images; 5000 in TUM recordings, 1000 = millimetres
-  double baseline_m = 0.075;        // of the structured-light pair behind the depth: its noise grows with depth^2 / (f b)
+  double baseline_m = 0.075;  // of the structured-light pair behind the depth: its noise grows with depth^2 / (f b)
   double frame_rate_hz = 30;
 
   /// Point in the camera frame (z > 0) -> ideal (undistorted) pixel.
@@ -34,7 +34,7 @@ struct Camera {
   }
   /// Ideal pixel -> where the lens puts it in the recorded image.
   Eigen::Vector2d distort(const Eigen::Vector2d& ideal) const;
-  /// Recorded pixel -> ideal pixel (fixed-point iteration, converges for the mild lenses of RGB-D cameras).
+  /// Recorded pixel -> ideal pixel: damped Newton iteration; where the lens model has no inverse, the nearest found.
   Eigen::Vector2d undistort(const Eigen::Vector2d& recorded) const;
 
   /// Sizes 16..16384, focal lengths finite and positive, principal point inside the image, depth factor positive.

@@ -8,7 +8,8 @@ namespace semvslam {
 /// Cross-product matrix: skew(a) * b == a x b.
 Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 
-/// A rigid motion, named `a_from_b` wherever it is stored: x_a = a_from_b * x_b. Unit quaternion and translation in metres.
+/// A rigid motion, named `a_from_b` wherever it is stored: x_a = a_from_b * x_b. Unit quaternion and translation in
+/// metres.
 class SE3 {
  public:
   using Tangent = Eigen::Matrix<double, 6, 1>;  // (translation part, rotation part), left increment: exp(xi) * pose
@@ -50,7 +51,9 @@ class SE3 {
 struct Sim3 {
   double scale = 1.0;
   SE3 rigid;  // the rotation and the translation
-  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return scale * (rigid.rotation() * p) + rigid.translation(); }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
+    return scale * (rigid.rotation() * p) + rigid.translation();
+  }
 };
 
 }  // namespace semvslam
