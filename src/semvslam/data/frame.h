@@ -34,8 +34,8 @@ inline float depth_at_m(const cv::Mat& depth, float metres_per_unit, int x, int 
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// The next frame; an empty optional at the end of the stream. After an Error the stream may go on (a frame that could not
-  /// be read is one Error) unless `fatal()` says otherwise.
+  /// The next frame; an empty optional at the end of the stream. After an Error the stream may go on (a frame that
+  /// could not be read is one Error) unless `fatal()` says otherwise.
   virtual Result<std::optional<RgbdFrame>> next() = 0;
   virtual bool fatal() const { return false; }
   virtual const Camera& camera() const = 0;
