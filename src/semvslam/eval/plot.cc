@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "semvslam/eval/evaluation.h"
+#include "semvslam/eval/svg_chart.h"
+
+namespace semvslam {
+namespace {
+
+constexpr const char* kTruthColour = "#555555";
+constexpr const char* kEstimateColour = "#0868ac";
+constexpr const char* kAgainstColour = "#e6740b";
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// A longer silence than this is drawn as a gap: ten usual steps, but at least half a second.
+std::int64_t longest_step_ns(const std::vector<TimeStamp>& stamps) {
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 1; i < stamps.size(); ++i) steps.push_back(stamps[i].ns - stamps[i - 1].ns);
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return std::max<std::int64_t>(10 * *middle, 500'000'000);
+}
+
+struct Curve {
+  std::string label, colour;
+  std::vector<TimeStamp> stamps;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<double> errors_m;  // empty for the truth
+  bool dashed = false;
+};
+
+Curve curve_of(const NamedEvaluation& named, const char* colour) {
+  const AbsoluteError& e = named.evaluation.absolute;
+  std::string label = fmt::format("{}: ATE RMSE {:.4f} m, max {:.4f} m, tracked {:.1f} %", named.name,
+                                  e.statistics_m.rmse, e.statistics_m.max, 100 * named.evaluation.tracked_share);
+  return {std::move(label), colour, e.stamps, e.estimate, e.errors_m};
+}
+
+/// @param x, y what is drawn of the curve's i-th moment.
+template <typename X, typename Y>
+ChartSeries series_of(const Curve& curve, X x, Y y) {
+  ChartSeries out{curve.label, curve.colour, {}, {}, curve.dashed};
+  const std::int64_t longest_ns = longest_step_ns(curve.stamps);
+  for (std::size_t i = 0; i < curve.stamps.size(); ++i) {
+    if (i > 0 && curve.stamps[i].ns - curve.stamps[i - 1].ns > longest_ns) out.x.push_back(kNan), out.y.push_back(kNan);
+    out.x.push_back(x(i));
+    out.y.push_back(y(i));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string format_svg(const EvaluationReport& report) {
+  const AbsoluteError& main = report.estimate.evaluation.absolute;
+  std::vector<Curve> curves = {
+      {"ground truth " + report.reference_name, kTruthColour, main.stamps, main.reference, {}, true}};
+  if (report.against) curves.push_back(curve_of(*report.against, kAgainstColour));
+  curves.push_back(curve_of(report.estimate, kEstimateColour));
+
+  const double top = 46 + 18 * static_cast<double>(curves.size());
+  Chart above{"x-y", "x (m)", "y (m)", 0, top, 480, 400, true, false, {}};
+  Chart side{"x-z", "x (m)", "z (m)", 480, top, 480, 400, true, false, {}};
+  Chart error{"absolute error over time", "time (s)", "error (m)", 0, top + 400, 960, 250, false, true, {}};
+  const std::int64_t start_ns = main.stamps.front().ns;
+  std::vector<LegendEntry> legend;
+  for (const Curve& curve : curves) {
+    const auto along = [&](int axis) { return [&curve, axis](std::size_t i) { return curve.positions[i][axis]; }; };
+    above.series.push_back(series_of(curve, along(0), along(1)));
+    side.series.push_back(series_of(curve, along(0), along(2)));
+    const auto seconds = [&](std::size_t i) { return static_cast<double>(curve.stamps[i].ns - start_ns) * 1e-9; };
+    if (!curve.errors_m.empty())
+      error.series.push_back(series_of(curve, seconds, [&](std::size_t i) { return curve.errors_m[i]; }));
+    legend.push_back({curve.label, curve.colour, curve.dashed});
+  }
+  return draw_svg(960, top + 655,
+                  report.options.with_scale ? "Trajectories aligned by Sim(3)" : "Trajectories aligned by SE(3)",
+                  legend, {above, side, error});
+}
+
+}  // namespace semvslam

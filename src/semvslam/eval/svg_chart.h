@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace semvslam {
+
+/// One line of a chart. A NaN in x or y breaks the line.
+struct ChartSeries {
+  std::string label, colour;  // colour: "#rrggbb"
+  std::vector<double> x, y;
+  bool dashed = false;
+};
+
+/// A chart with axes, ticks and grid, placed in an SVG drawing.
+struct Chart {
+  std::string title, x_label, y_label;
+  double left_px = 0, top_px = 0, width_px = 0, height_px = 0;  // the outer box, labels included
+  bool equal_aspect = false;                                    // one unit is as long on both axes
+  bool y_from_zero = false;
+  std::vector<ChartSeries> series;
+};
+
+/// What one line means.
+struct LegendEntry {
+  std::string label, colour;
+  bool dashed = false;
+};
+
+/// Positions for ticks: multiples of 1, 2 or 5 times a power of ten inside [low, high], about `wanted` of them.
+std::vector<double> tick_positions(double low, double high, int wanted);
+
+/// Text for use inside SVG: & < > " escaped, control characters replaced.
+std::string svg_escape(const std::string& text);
+
+/// A complete SVG document with white background, a title, a legend line below it, and the charts.
+std::string draw_svg(double width_px, double height_px, const std::string& title,
+                     const std::vector<LegendEntry>& legend, const std::vector<Chart>& charts);
+
+}  // namespace semvslam
