@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Check point -> three ONNX graphs (trunk, box head, mask head), model.json, and INT8 forms where wanted.
+
+usage: export.py CHECKPOINT OUT_DIR [--size 384x512] [--int8 COCO_JSON IMAGES]
+"""
+import argparse
+import copy
+import hashlib
+import json
+import os
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from segnet import boxes, model
+
+
+def fuse(m):
+    """Batch normalisation into the convolution before it."""
+    for name, child in m.named_children():
+        if isinstance(child, nn.Sequential):
+            layers, k = list(child), 0
+            while k + 1 < len(layers):
+                if isinstance(layers[k], nn.Conv2d) and isinstance(layers[k + 1], nn.BatchNorm2d):
+                    layers[k:k + 2] = [fuse_conv_bn_eval(layers[k], layers[k + 1])]
+                k += 1
+            if len(layers) != len(child):
+                setattr(m, name, nn.Sequential(*layers))
+                child = getattr(m, name)
+        fuse(child)
+    return m
+
+
+class Trunk(nn.Module):
+    """Channels last everywhere: the C++ side reads whole feature vectors of a cell."""
+
+    def __init__(self, net):
+        super().__init__()
+        self.net = net
+
+    def forward(self, image):
+        p, obj, deltas, semantic = self.net.trunk(image)
+        return tuple(t.permute(0, 2, 3, 1) for t in (*p, *obj, *deltas, semantic.sigmoid()))
+
+
+class Box(nn.Module):
+    def __init__(self, net):
+        super().__init__()
+        self.head = net.box
+
+    def forward(self, rois):
+        score, deltas = self.head(rois.flatten(1))
+        return score.softmax(1), deltas
+
+
+class Mask(nn.Module):
+    def __init__(self, net):
+        super().__init__()
+        self.head = net.mask
+
+    def forward(self, rois):
+        return self.head(rois.permute(0, 3, 1, 2)).sigmoid()
+
+
+TRUNK_OUT = ["p3", "p4", "p5", "objectness3", "objectness4", "objectness5", "deltas3", "deltas4", "deltas5", "semantic"]
+
+
+def load(path):
+    state = torch.load(path, map_location="cpu", weights_only=False)
+    net = model.MaskRcnn(state["backbone"], len(state["names"]))
+    net.load_state_dict(state["ema"])
+    return fuse(net.eval()).requires_grad_(False), state
+
+
+def write_onnx(net, out, size):
+    c = model.CHANNELS
+    jobs = (("trunk", Trunk(net), torch.zeros(1, 3, *size), "image", TRUNK_OUT, None),
+            ("box", Box(net), torch.zeros(4, 7, 7, c), "rois", ["probabilities", "deltas"], {"rois": {0: "n"}, "probabilities": {0: "n"}, "deltas": {0: "n"}}),
+            ("mask", Mask(net), torch.zeros(4, 14, 14, c), "rois", ["masks"], {"rois": {0: "n"}, "masks": {0: "n"}}))
+    for name, m, x, given, outs, dyn in jobs:
+        torch.onnx.export(m.eval(), (x,), os.path.join(out, name + ".onnx"), input_names=[given], output_names=outs, dynamic_axes=dyn,
+                          opset_version=17, dynamo=False)
+
+
+def calibration(json_path, images, size, most=200):
+    """Training pictures as the network sees them; every second one zoomed into, so that bodies of all sizes occur."""
+    import cv2
+
+    import infer
+    with open(json_path) as f:
+        listed = json.load(f)["images"]
+    rng = np.random.default_rng(0)
+    for i in rng.permutation(len(listed))[:most]:
+        bgr = cv2.imread(os.path.join(images, listed[i]["file_name"]))
+        if rng.random() < 0.5:
+            h, w = bgr.shape[:2]
+            f = rng.uniform(0.4, 0.9)
+            y, x = int(rng.uniform(0, h * (1 - f))), int(rng.uniform(0, w * (1 - f)))
+            bgr = bgr[y:y + int(h * f), x:x + int(w * f)]
+        rgb, _, _ = infer.letterbox(bgr, size)
+        yield np.ascontiguousarray(rgb.transpose(2, 0, 1)[None], np.float32) / 127.5 - 1
+
+
+def quantise(out, pictures, keep_float=()):
+    """INT8 graphs in OpenVINO's format beside the ONNX ones. Calibrates the heads on the ROIs of the pictures' proposals."""
+    import nncf
+    import openvino as ov
+
+    import infer
+    core = ov.Core()
+    s = infer.Segmenter(infer.OpenVino(out, precision="f32"))
+    rois, mask_rois = [], []
+    for x in pictures[::4]:
+        t = s.g.trunk(x)
+        levels = [t["p3"][0].copy(), t["p4"][0].copy(), t["p5"][0].copy()]
+        prop = s.proposals(t)
+        rois.append(infer.roi_align(levels, prop, 7, infer.BOX_LEVELS))
+        mask_rois.append(infer.roi_align(levels, prop[:8], 14, infer.MASK_LEVELS))
+    for name, data in (("trunk", pictures), ("box", rois), ("mask", mask_rois)):
+        if name in keep_float:
+            continue
+        m = core.read_model(os.path.join(out, name + ".onnx"))
+        # The last 1x1 convolutions are cheap, and coarse steps in scores and box sizes cost accuracy.
+        last = [n.get_friendly_name() for n in m.get_ops() if n.get_type_name() == "Convolution"
+                and any(p in n.get_friendly_name() for p in ("objectness", "deltas", "semantic", "logits"))]
+        scope = nncf.IgnoredScope(names=last, validate=False) if last else None
+        q = nncf.quantize(m, nncf.Dataset(data), subset_size=len(data), ignored_scope=scope)
+        ov.save_model(q, os.path.join(out, name + ".int8.xml"), compress_to_fp16=True)
+
+
+def sha(path):
+    with open(path, "rb") as f:
+        return hashlib.sha256(f.read()).hexdigest()
+
+
+def about(state, out, size, trunk, box, mask):
+    files = sorted(f for f in os.listdir(out) if f.endswith((".onnx", ".xml", ".bin")))
+    return {"format": 1, "name": "semvslam-maskrcnn-" + state["backbone"], "backbone": state["backbone"], "trunk": trunk, "box": box, "mask": mask,
+            "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
+            "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
+            "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
+            "training": {"steps": state["step"], "images_seen": state["seen"]}, "sha256": {f: sha(os.path.join(out, f)) for f in files}}
+
+
+def main():
+    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    a.add_argument("checkpoint")
+    a.add_argument("out")
+    a.add_argument("--size", default="384x512")
+    a.add_argument("--int8", nargs=2, metavar=("COCO_JSON", "IMAGES"))
+    a.add_argument("--keep-float", nargs="*", default=[], choices=("trunk", "box", "mask"))
+    o = a.parse_args()
+    os.makedirs(o.out, exist_ok=True)
+    size = tuple(int(v) for v in o.size.split("x"))
+    net, state = load(o.checkpoint)
+    write_onnx(net, o.out, size)
+    names = {g: g + ".onnx" for g in ("trunk", "box", "mask")}
+    if o.int8:
+        quantise(o.out, list(calibration(*o.int8, size)), o.keep_float)
+        names = {g: n if g in o.keep_float else g + ".int8.xml" for g, n in names.items()}
+    with open(os.path.join(o.out, "model.json"), "w") as f:
+        json.dump(about(state, o.out, size, **names), f, indent=1)
+    print(json.dumps({f: os.path.getsize(os.path.join(o.out, f)) for f in sorted(os.listdir(o.out))}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

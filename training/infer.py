@@ -1,0 +1,256 @@
+#!/usr/bin/env python3
+"""Reference inference with the exported graphs: exactly the steps that the C++ side repeats (see README.md).
+
+usage: infer.py MODEL_DIR IMAGE... --out DIR [--score 0.5] [--threads 2]
+Writes an overlay (PNG) and prints the instances of every image.
+"""
+import argparse
+import json
+import math
+import os
+import time
+
+import cv2
+import numpy as np
+
+STRIDES = (8, 16, 32)
+SIZES = ((32.0, 56.0), (96.0, 160.0), (256.0, 416.0))
+RATIOS = (0.5, 1.0, 2.0)
+CLIP = math.log(1000.0 / 16.0)
+BOX_WEIGHTS = np.array((10.0, 10.0, 5.0, 5.0), np.float32)
+BOX_LEVELS, MASK_LEVELS = (112.0, 336.0), (224.0,)
+GREY = 127
+PROPOSALS_PER_LEVEL, PROPOSALS = 300, 50
+RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
+
+
+def letterbox(bgr, size):
+    """Resized to fit size (h, w), placed at the top left, grey elsewhere. Returns RGB uint8 and the two scales."""
+    H, W = size
+    h, w = bgr.shape[:2]
+    f = min(H / h, W / w)
+    nh, nw = min(H, max(1, round(h * f))), min(W, max(1, round(w * f)))
+    small = cv2.resize(bgr, (nw, nh), interpolation=cv2.INTER_AREA if f < 0.5 else cv2.INTER_LINEAR)
+    out = np.full((H, W, 3), GREY, np.uint8)
+    out[:nh, :nw] = small[:, :, ::-1]
+    return out, nw / w, nh / h
+
+
+def anchors(level, h, w):
+    s = STRIDES[level]
+    cell = np.array([[-a / math.sqrt(r) / 2, -a * math.sqrt(r) / 2, a / math.sqrt(r) / 2, a * math.sqrt(r) / 2]
+                     for a in SIZES[level] for r in RATIOS], np.float32)
+    x, y = np.meshgrid((np.arange(w) + 0.5) * s, (np.arange(h) + 0.5) * s)
+    c = np.stack((x, y, x, y), -1).reshape(-1, 1, 4).astype(np.float32)
+    return (c + cell[None]).reshape(-1, 4)
+
+
+def decode(d, ref, size):
+    w, h = ref[:, 2] - ref[:, 0], ref[:, 3] - ref[:, 1]
+    cx = (ref[:, 0] + ref[:, 2]) / 2 + d[:, 0] * w
+    cy = (ref[:, 1] + ref[:, 3]) / 2 + d[:, 1] * h
+    bw, bh = w * np.exp(np.minimum(d[:, 2], CLIP)), h * np.exp(np.minimum(d[:, 3], CLIP))
+    b = np.stack((cx - bw / 2, cy - bh / 2, cx + bw / 2, cy + bh / 2), 1)
+    return np.clip(b, 0, np.array([size[1], size[0], size[1], size[0]], np.float32))
+
+
+def nms(boxes, scores, threshold, most):
+    """Indices kept, best first. Equal scores: the earlier one first. IoU above the threshold removes."""
+    order = np.argsort(-scores, kind="stable")
+    area = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
+    keep = []
+    while len(order) and len(keep) < most:
+        i, rest = order[0], order[1:]
+        keep.append(i)
+        w = np.minimum(boxes[i, 2], boxes[rest, 2]) - np.maximum(boxes[i, 0], boxes[rest, 0])
+        h = np.minimum(boxes[i, 3], boxes[rest, 3]) - np.maximum(boxes[i, 1], boxes[rest, 1])
+        inter = np.maximum(w, 0) * np.maximum(h, 0)
+        order = rest[inter <= threshold * (area[i] + area[rest] - inter)]
+    return np.array(keep, int)
+
+
+def axis(lo, hi, size, cells):
+    """Two samples a cell; a sample outside [-1, size] counts 0, else it is clamped into the map."""
+    at = lo[:, None] + (hi - lo)[:, None] * ((np.arange(cells * 2, dtype=np.float32) + 0.5) / (cells * 2))[None]
+    inside = (at >= -1) & (at <= size)
+    at = np.clip(at, 0, size - 1)
+    i = np.floor(at).astype(int)
+    f = (at - i).astype(np.float32)
+    return i, np.minimum(i + 1, size - 1), np.where(inside, 1 - f, 0), np.where(inside, f, 0)
+
+
+def roi_align(levels, boxes, cells, thresholds):
+    """levels: [H, W, C] each; boxes [N, 4] in input pixels -> [N, cells, cells, C]."""
+    s = np.sqrt(np.maximum((boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]), 0))
+    level = sum((s >= t).astype(int) for t in thresholds)
+    out = np.zeros((len(boxes), cells, cells, levels[0].shape[2]), np.float32)
+    for l in range(len(thresholds) + 1):
+        n = np.nonzero(level == l)[0]
+        if not len(n):
+            continue
+        f, b = levels[l], boxes[n] / STRIDES[l] - 0.5
+        i0, i1, a0, a1 = axis(b[:, 1], b[:, 3], f.shape[0], cells)
+        j0, j1, b0, b1 = axis(b[:, 0], b[:, 2], f.shape[1], cells)
+        v = 0.0
+        for i, a in ((i0, a0), (i1, a1)):
+            for j, c in ((j0, b0), (j1, b1)):
+                v = v + f[i[:, :, None], j[:, None, :]] * (a[:, :, None] * c[:, None, :])[..., None]
+        out[n] = v.reshape(len(n), cells, 2, cells, 2, -1).mean((2, 4))
+    return out
+
+
+def paste(prob, box, size):
+    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image: bilinear, 0 beyond the 28 x 28 cells."""
+    x0, y0 = max(0, math.floor(box[0])), max(0, math.floor(box[1]))
+    x1, y1 = min(size[1], math.ceil(box[2])), min(size[0], math.ceil(box[3]))
+    if x1 <= x0 or y1 <= y0:
+        return 0, 0, np.zeros((0, 0), bool)
+    n = prob.shape[0]
+    u = ((np.arange(x0, x1) + 0.5 - box[0]) / max(box[2] - box[0], 1e-3) * n - 0.5).astype(np.float32)
+    v = ((np.arange(y0, y1) + 0.5 - box[1]) / max(box[3] - box[1], 1e-3) * n - 0.5).astype(np.float32)
+    padded = np.zeros((n + 2, n + 2), np.float32)
+    padded[1:-1, 1:-1] = prob
+    iu, iv = np.clip(np.floor(u), -1, n - 1).astype(int), np.clip(np.floor(v), -1, n - 1).astype(int)
+    fu, fv = np.clip(u - iu, 0, 1)[None, :], np.clip(v - iv, 0, 1)[:, None]
+    rows0, rows1 = padded[iv + 1], padded[iv + 2]
+    top = rows0[:, iu + 1] * (1 - fu) + rows0[:, iu + 2] * fu
+    low = rows1[:, iu + 1] * (1 - fu) + rows1[:, iu + 2] * fu
+    return x0, y0, top * (1 - fv) + low * fv >= 0.5
+
+
+class OpenVino:
+    """The three exported graphs."""
+
+    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx"):
+        import openvino as ov
+        core = ov.Core()
+        options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1}
+        if precision:
+            options["INFERENCE_PRECISION_HINT"] = precision
+        self.graphs = [core.compile_model(os.path.join(folder, f), "CPU", options).create_infer_request() for f in (trunk, box, mask)]
+        self.size = tuple(self.graphs[0].get_compiled_model().input(0).shape)[2:]
+
+    def run(self, graph, x):
+        r = self.graphs[graph]
+        r.infer([x], share_inputs=True)
+        return {p.get_any_name(): r.get_tensor(p).data for p in r.get_compiled_model().outputs}
+
+    def trunk(self, x):
+        return self.run(0, x)
+
+    def box(self, x):
+        return self.run(1, x)
+
+    def mask(self, x):
+        return self.run(2, x)
+
+
+class Segmenter:
+    def __init__(self, graphs):
+        self.g = graphs
+        H, W = graphs.size
+        self.anchors = [anchors(i, H // s, W // s) for i, s in enumerate(STRIDES)]
+        self.times = {}
+
+    def lap(self, name, since):
+        now = time.perf_counter()
+        self.times.setdefault(name, []).append((now - since) * 1e3)
+        return now
+
+    def proposals(self, t):
+        boxes, scores = [], []
+        for i, a in enumerate(self.anchors):
+            s, d = t[f"objectness{i + 3}"].reshape(-1), t[f"deltas{i + 3}"].reshape(-1, 4)
+            top = np.argsort(-s, kind="stable")[:PROPOSALS_PER_LEVEL]
+            boxes.append(decode(d[top], a[top], self.g.size))
+            scores.append(s[top])
+        b, s = np.concatenate(boxes), np.concatenate(scores)
+        ok = (b[:, 2] - b[:, 0] >= 4) & (b[:, 3] - b[:, 1] >= 4) & np.isfinite(s)
+        b, s = b[ok], s[ok]
+        return b[nms(b, s, RPN_NMS, PROPOSALS)]
+
+    def __call__(self, bgr, least=0.05):
+        """Instances, best first: class (0 = person), score, box (x0 y0 x1 y1 in the image), window (x0, y0, mask)."""
+        t0 = time.perf_counter()
+        rgb, fx, fy = letterbox(bgr, self.g.size)
+        x = np.ascontiguousarray(rgb.transpose(2, 0, 1)[None], np.float32) / 127.5 - 1
+        t0 = self.lap("prepare", t0)
+        t = self.g.trunk(x)
+        t0 = self.lap("trunk", t0)
+        levels = [t["p3"][0], t["p4"][0], t["p5"][0]]
+        prop = self.proposals(t)
+        t0 = self.lap("proposals", t0)
+        if not len(prop):
+            return []
+        r = roi_align(levels, prop, 7, BOX_LEVELS)
+        t0 = self.lap("align", t0)
+        o = self.g.box(r)
+        t0 = self.lap("box", t0)
+        boxes = decode(o["deltas"] / BOX_WEIGHTS, prop, self.g.size)
+        n, c = np.nonzero(o["probabilities"][:, 1:] >= least)
+        b, s = boxes[n], o["probabilities"][n, c + 1]
+        ok = (b[:, 2] - b[:, 0] >= 2) & (b[:, 3] - b[:, 1] >= 2)
+        b, s, c = b[ok], s[ok], c[ok]
+        keep = nms(b + c[:, None].astype(np.float32) * 4096, s, BOX_NMS, MOST)      # the offset keeps classes apart
+        b, s, c = b[keep], s[keep], c[keep]
+        t0 = self.lap("select", t0)
+        if not len(b):
+            return []
+        r = roi_align(levels, b, 14, MASK_LEVELS)
+        t0 = self.lap("align", t0)
+        m = self.g.mask(r)["masks"]
+        t0 = self.lap("mask", t0)
+        out = []
+        for i in range(len(b)):
+            box = b[i] / np.array([fx, fy, fx, fy], np.float32)
+            box = np.minimum(box, np.array([bgr.shape[1], bgr.shape[0]] * 2, np.float32))
+            out.append({"class": int(c[i]), "score": float(s[i]), "box": box,
+                        "window": paste(m[i, 0 if c[i] == 0 else 1], box, bgr.shape[:2])})
+        self.lap("paste", t0)
+        return out
+
+
+def full_mask(instance, size):
+    out = np.zeros(size, bool)
+    x, y, m = instance["window"]
+    out[y:y + m.shape[0], x:x + m.shape[1]] = m
+    return out
+
+
+def overlay(bgr, instances, names):
+    out = bgr.copy()
+    for k, i in enumerate(instances):
+        colour = np.array([(60, 200, 60), (60, 60, 230), (230, 120, 40), (40, 200, 230), (200, 60, 200)][k % 5])
+        m = full_mask(i, bgr.shape[:2])
+        out[m] = (out[m] * 0.55 + colour * 0.45).astype(np.uint8)
+        x0, y0, x1, y1 = (int(v) for v in i["box"])
+        cv2.rectangle(out, (x0, y0), (x1, y1), tuple(int(v) for v in colour), 1)
+        cv2.putText(out, f"{names[i['class']]} {i['score']:.2f}", (x0 + 2, y0 + 12), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (255, 255, 255), 1)
+    return out
+
+
+def main():
+    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    a.add_argument("models")
+    a.add_argument("images", nargs="+")
+    a.add_argument("--out")
+    a.add_argument("--score", type=float, default=0.5)
+    a.add_argument("--threads", type=int, default=2)
+    o = a.parse_args()
+    with open(os.path.join(o.models, "model.json")) as f:
+        about = json.load(f)
+    s = Segmenter(OpenVino(o.models, o.threads, trunk=about["trunk"], box=about["box"], mask=about["mask"]))
+    for path in o.images:
+        bgr = cv2.imread(path)
+        if bgr is None:
+            raise SystemExit(f"cannot read {path}")
+        found = s(bgr, o.score)
+        print(path, [(about["classes"][i["class"]], round(i["score"], 3), [round(float(v), 1) for v in i["box"]]) for i in found])
+        if o.out:
+            os.makedirs(o.out, exist_ok=True)
+            name = os.path.splitext(os.path.basename(path))[0] + ".png"
+            cv2.imwrite(os.path.join(o.out, name), overlay(bgr, found, about["classes"]))
+
+
+if __name__ == "__main__":
+    main()
