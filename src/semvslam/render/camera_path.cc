@@ -13,7 +13,7 @@ constexpr double kTourSpeed_m_s = 0.34;
 
 /// Around the desks, then the great round through both rooms.
 std::vector<Eigen::Vector2d> tour_corners() {
-  const double west = -2.9, south = kSouthDoor_m, north = kNorthDoor_m, door_side = 2.3, far_room = 4.95;
+  const double west = -3.0, south = kSouthDoor_m, north = kNorthDoor_m, door_side = 2.3, far_room = 4.95;
   return {{west, south}, {door_side, south}, {door_side, north}, {west, north},
           {west, south}, {far_room, south},  {far_room, north},  {west, north}};
 }

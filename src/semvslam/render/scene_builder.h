@@ -52,6 +52,8 @@ class SceneBuilder {
 
   /// Surfaces added from here on belong to a new mesh (which is culled as a whole).
   void begin_mesh();
+  /// Index of the mesh that is being built.
+  std::size_t mesh_index() const { return scene_.meshes.size() - 1; }
 
   /// A parallelogram; visible from where `along_u` to `along_v` turns counter-clockwise. The image's top is at the far end of
   /// `along_v`. @param light_step_m distance of baked light values.

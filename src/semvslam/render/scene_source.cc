@@ -7,6 +7,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "semvslam/render/camera_path.h"
+#include "semvslam/render/cast.h"
+#include "semvslam/render/contact_shadow.h"
+#include "semvslam/render/light_bake.h"
 #include "semvslam/render/random.h"
 #include "semvslam/render/rasterizer.h"
 #include "semvslam/render/room.h"
@@ -59,8 +62,14 @@ struct RenderedScene::Impl {
   explicit Impl(const SceneOptions& chosen)
       : options(chosen), camera(make_camera(chosen)), path(chosen.motion, chosen.seed), rasterizer(camera), sensor(camera) {
     SceneBuilder builder;
-    room = build_room(builder, options.seed);
+    const Room room = build_room(builder, options.seed);
+    cast = std::make_unique<Cast>(options.people, options.seed, room.seats, builder, options.threads);
     scene = builder.finish();
+    cast->take_items(scene);
+    light = std::make_unique<LightModel>(room.lights);
+    bake_light(scene, *light, options.threads);
+    shadow = std::make_unique<ContactShadow>(scene.light);
+    for (const Cast::Role& role : cast->roles()) roles.push_back({role.name, role.person ? "person" : "object", true});
   }
 
   double time_s(std::size_t index) const { return static_cast<double>(index) / options.frame_rate_hz; }
@@ -73,16 +82,24 @@ struct RenderedScene::Impl {
   CameraPath path;
   Rasterizer rasterizer;
   SensorModel sensor;
-  Room room;
   StaticScene scene;
+  std::unique_ptr<Cast> cast;
+  std::unique_ptr<LightModel> light;
+  std::unique_ptr<ContactShadow> shadow;
+  std::vector<Mesh> moving;
+  std::vector<Occluder> occluders;
   std::vector<SceneRole> roles;
   Picture picture, exposure;
 };
 
 void RenderedScene::Impl::draw(double time, Picture& out) {
+  const SE3 world_from_camera = path.pose(time);
+  cast->arrange(time, world_from_camera.translation(), *light, moving, occluders);
+  shadow->update(scene.patches, occluders);
   std::vector<const Mesh*> meshes;
   for (const Mesh& mesh : scene.meshes) meshes.push_back(&mesh);
-  rasterizer.draw(meshes, scene.textures, scene.light, path.pose(time), options.threads, out);
+  for (const Mesh& mesh : moving) meshes.push_back(&mesh);
+  rasterizer.draw(meshes, scene.textures, shadow->current(), world_from_camera, options.threads, out);
 }
 
 /// The mean of pictures spread evenly around the stamp; depth and masks stay those of the stamp.
