@@ -53,17 +53,28 @@ void unfilter_sub(std::uint8_t* row, std::size_t size) {
   sub_scalar<kPixel>(row, i, size);
 }
 
+// A pixel moves between memory and register in whole words: three bytes through the stack would wait for each other.
+
+/// @param wide four bytes may be read: the bytes behind the pixel are then whatever follows it, and do no harm.
 template <int kPixel>
-__m128i load_pixel(const std::uint8_t* p) {
+__m128i load_pixel(const std::uint8_t* p, bool wide) {
+  constexpr int kWide = kPixel == 3 ? 4 : kPixel;
+  if (kWide != kPixel && !wide) return _mm_cvtsi32_si128(p[0] | p[1] << 8 | p[2] << 16);
   std::uint32_t bits = 0;
-  std::memcpy(&bits, p, kPixel);
+  std::memcpy(&bits, p, kWide);
   return _mm_cvtsi32_si128(static_cast<int>(bits));
 }
 
 template <int kPixel>
 void store_pixel(std::uint8_t* p, __m128i pixel) {
-  const int bits = _mm_cvtsi128_si32(pixel);
-  std::memcpy(p, &bits, kPixel);
+  const auto bits = static_cast<std::uint32_t>(_mm_cvtsi128_si32(pixel));
+  if constexpr (kPixel == 3) {
+    const auto low = static_cast<std::uint16_t>(bits);
+    std::memcpy(p, &low, 2);
+    p[2] = static_cast<std::uint8_t>(bits >> 16);
+  } else {
+    std::memcpy(p, &bits, kPixel);
+  }
 }
 
 template <int kPixel>
@@ -71,10 +82,11 @@ void unfilter_average(std::uint8_t* row, const std::uint8_t* above, std::size_t 
   const __m128i one = _mm_set1_epi8(1);
   __m128i left = _mm_setzero_si128();
   for (std::size_t i = 0; i + kPixel <= size; i += kPixel) {
-    const __m128i up = load_pixel<kPixel>(above + i);
+    const bool wide = i + 4 <= size;
+    const __m128i up = load_pixel<kPixel>(above + i, wide);
     // pavgb rounds up, PNG rounds down: take away the low bit of the difference.
     const __m128i mean = _mm_sub_epi8(_mm_avg_epu8(left, up), _mm_and_si128(_mm_xor_si128(left, up), one));
-    left = _mm_add_epi8(load_pixel<kPixel>(row + i), mean);
+    left = _mm_add_epi8(load_pixel<kPixel>(row + i, wide), mean);
     store_pixel<kPixel>(row + i, left);
   }
 }
@@ -84,8 +96,9 @@ void unfilter_paeth(std::uint8_t* row, const std::uint8_t* above, std::size_t si
   const __m128i zero = _mm_setzero_si128();
   __m128i a = zero, c = zero;  // left and upper left pixel, 16 bits per byte
   for (std::size_t i = 0; i + kPixel <= size; i += kPixel) {
-    const __m128i b = _mm_unpacklo_epi8(load_pixel<kPixel>(above + i), zero);
-    const __m128i x = _mm_unpacklo_epi8(load_pixel<kPixel>(row + i), zero);
+    const bool wide = i + 4 <= size;
+    const __m128i b = _mm_unpacklo_epi8(load_pixel<kPixel>(above + i, wide), zero);
+    const __m128i x = _mm_unpacklo_epi8(load_pixel<kPixel>(row + i, wide), zero);
     const __m128i b_c = _mm_sub_epi16(b, c), a_c = _mm_sub_epi16(a, c);
     const __m128i pa = _mm_abs_epi16(b_c), pb = _mm_abs_epi16(a_c), pc = _mm_abs_epi16(_mm_add_epi16(b_c, a_c));
     const __m128i least = _mm_min_epi16(pc, _mm_min_epi16(pa, pb));

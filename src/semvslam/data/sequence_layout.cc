@@ -135,9 +135,11 @@ Result<SequenceLayout> layout_of_folders(const fs::path& folder, const std::stri
   }
   layout.stamps_are_frame_numbers = true;
   layout.pairs = pair_by_key(colour_folder, *colour, depth_folder, *depth, stem_of);
-  if (layout.pairs.pairs.empty())
+  const auto numbered = [](const std::string& name) { return last_number(stem_of(name)).has_value(); };
+  if (layout.pairs.pairs.empty() && std::all_of(colour->begin(), colour->end(), numbered) &&
+      std::all_of(depth->begin(), depth->end(), numbered))
     layout.pairs = pair_by_key(colour_folder, *colour, depth_folder, *depth,
-                               [](const std::string& name) { return last_number(stem_of(name)).value_or(-1); });
+                               [](const std::string& name) { return *last_number(stem_of(name)); });
   if (layout.pairs.pairs.empty() && colour->size() == depth->size()) {
     layout.pairs = {};
     for (std::size_t i = 0; i < colour->size(); ++i)

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <queue>
+#include <tuple>
 
 #include "semvslam/data/text_scan.h"
 
@@ -41,6 +43,53 @@ void add_count(std::string& text, std::size_t count, const char* singular, const
   if (count == 0) return;
   if (!text.empty()) text += ", ";
   text += fmt::format("{} {} ({})", count, count == 1 ? singular : plural, done);
+}
+
+constexpr std::size_t kNoPartner = static_cast<std::size_t>(-1);
+
+/// For each colour image the depth image that the greedy rule (closest pair first, each used once) gives it, in
+/// O(n log n). Along the merged time line the closest pair left is always a pair of neighbours, for anything between
+/// two images of a pair would be closer to one of them: so a heap of neighbours suffices, and where a pair is taken out
+/// its outer neighbours become neighbours.
+std::vector<std::size_t> closest_pairs(const std::vector<TimedFile>& colour, const std::vector<TimedFile>& depth,
+                                       std::uint64_t max_gap_ns) {
+  struct Event {
+    TimeStamp stamp;
+    bool is_depth;
+    std::size_t index, before, after;
+  };
+  std::vector<Event> line;
+  for (std::size_t i = 0; i < colour.size(); ++i) line.push_back({colour[i].stamp, false, i, 0, 0});
+  for (std::size_t i = 0; i < depth.size(); ++i) line.push_back({depth[i].stamp, true, i, 0, 0});
+  std::stable_sort(line.begin(), line.end(), [](const Event& a, const Event& b) { return a.stamp < b.stamp; });
+  using Neighbours = std::tuple<std::uint64_t, std::size_t, std::size_t>;  // gap, then places on the line
+  std::priority_queue<Neighbours, std::vector<Neighbours>, std::greater<>> closest;
+  const auto offer = [&](std::size_t a, std::size_t b) {
+    if (a == kNoPartner || b == kNoPartner || line[a].is_depth == line[b].is_depth) return;
+    // Unsigned: stamps of opposite signs may be 2^63 apart.
+    const std::uint64_t gap =
+        static_cast<std::uint64_t>(line[b].stamp.ns) - static_cast<std::uint64_t>(line[a].stamp.ns);
+    if (gap <= max_gap_ns) closest.emplace(gap, a, b);
+  };
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    line[i].before = i == 0 ? kNoPartner : i - 1;
+    line[i].after = i + 1 == line.size() ? kNoPartner : i + 1;
+    if (i > 0) offer(i - 1, i);
+  }
+  std::vector<bool> taken(line.size(), false);
+  std::vector<std::size_t> depth_of(colour.size(), kNoPartner);
+  while (!closest.empty()) {
+    const auto [gap, a, b] = closest.top();
+    closest.pop();
+    if (taken[a] || taken[b]) continue;
+    taken[a] = taken[b] = true;
+    depth_of[line[line[a].is_depth ? b : a].index] = line[line[a].is_depth ? a : b].index;
+    const std::size_t before = line[a].before, after = line[b].after;
+    if (before != kNoPartner) line[before].after = after;
+    if (after != kNoPartner) line[after].before = before;
+    offer(before, after);
+  }
+  return depth_of;
 }
 
 bool mentions_depth(std::string_view file) { return file.find("depth") != std::string_view::npos; }
@@ -104,41 +153,11 @@ Result<PairList> parse_associations(std::string_view text, const std::string& na
 }
 
 PairList associate(const FileList& colour, const FileList& depth, double max_gap_s) {
-  struct Candidate {
-    std::uint64_t gap_ns;
-    std::size_t colour, depth;
-  };
   const auto max_gap_ns = static_cast<std::uint64_t>(std::clamp(std::round(max_gap_s * 1e9), 0.0, 9e18));
-  const auto gap = [](TimeStamp a, TimeStamp b) {  // unsigned: stamps of opposite signs may be 2^63 apart
-    return a < b ? static_cast<std::uint64_t>(b.ns) - static_cast<std::uint64_t>(a.ns)
-                 : static_cast<std::uint64_t>(a.ns) - static_cast<std::uint64_t>(b.ns);
-  };
-  std::vector<Candidate> candidates;
-  std::size_t first = 0;
-  for (std::size_t c = 0; c < colour.entries.size(); ++c) {
-    const TimeStamp stamp = colour.entries[c].stamp;
-    while (first < depth.entries.size() && depth.entries[first].stamp < stamp &&
-           gap(depth.entries[first].stamp, stamp) > max_gap_ns)
-      ++first;
-    for (std::size_t d = first; d < depth.entries.size(); ++d) {
-      const std::uint64_t g = gap(depth.entries[d].stamp, stamp);
-      if (g > max_gap_ns) break;
-      candidates.push_back({g, c, d});
-    }
-  }
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gap_ns < b.gap_ns; });
-  constexpr std::size_t kFree = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> depth_of(colour.entries.size(), kFree);
-  std::vector<bool> depth_used(depth.entries.size(), false);
-  for (const Candidate& k : candidates) {
-    if (depth_of[k.colour] != kFree || depth_used[k.depth]) continue;
-    depth_of[k.colour] = k.depth;
-    depth_used[k.depth] = true;
-  }
+  const std::vector<std::size_t> depth_of = closest_pairs(colour.entries, depth.entries, max_gap_ns);
   PairList list;
   for (std::size_t c = 0; c < colour.entries.size(); ++c) {
-    if (depth_of[c] == kFree) continue;
+    if (depth_of[c] == kNoPartner) continue;
     list.pairs.push_back({colour.entries[c].stamp, colour.entries[c].file, depth.entries[depth_of[c]].file});
   }
   list.colour_without_depth = colour.entries.size() - list.pairs.size();
