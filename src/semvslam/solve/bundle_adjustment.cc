@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "semvslam/solve/schur_sweep.h"
@@ -11,10 +12,12 @@ namespace {
 
 constexpr double kFirstLambda = 1e-4, kSmallestLambda = 1e-9, kLargestLambda = 1e8;
 
-// One pass of Levenberg-Marquardt from the present state; the damping is carried from pass to pass.
+// One pass of Levenberg-Marquardt from the present state. A small damping is carried from pass to pass; one that grew
+// until nothing moved is not.
 void run_pass(SchurSweep& sweep, int iterations, double tolerance, double& lambda, const std::stop_token& stop,
               BaSummary& summary) {
   double cost = sweep.cost();
+  lambda = std::min(lambda, kFirstLambda);
   for (int i = 0; i < iterations && !summary.stopped; ++i) {
     ++summary.iterations;
     bool accepted = false;

@@ -12,10 +12,6 @@ Eigen::Matrix<double, 6, 6> unpack_pose_normal(const double* h) {
   return m;
 }
 
-double huber_cost(double s, double limit) { return s <= limit ? s : 2 * std::sqrt(limit * s) - limit; }
-
-double huber_weight(double s, double limit) { return s <= limit ? 1.0 : std::sqrt(limit / s); }
-
 DenseResidual dense_residual(const Intrinsics& camera, const SE3& camera_from_world,
                              const Eigen::Vector3d& point_in_world, const PointObservation& observation) {
   DenseResidual out;

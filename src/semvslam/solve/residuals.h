@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "semvslam/geometry/se3.h"
 #include "semvslam/solve/observation.h"
@@ -107,9 +108,9 @@ Eigen::Matrix<double, 6, 6> unpack_pose_normal(const double* h);
 
 /// Huber's loss of a squared error s >= 0 (in units of its variance) with the corner at `limit` = delta^2:
 /// s below the corner, 2 delta sqrt(s) - delta^2 above. Twice the usual definition, so that it equals chi^2 inside.
-double huber_cost(double s, double limit);
+inline double huber_cost(double s, double limit) { return s <= limit ? s : 2 * std::sqrt(limit * s) - limit; }
 /// Its derivative, the weight of iteratively re-weighted least squares: 1 below the corner, delta / sqrt(s) above.
-double huber_weight(double s, double limit);
+inline double huber_weight(double s, double limit) { return s <= limit ? 1.0 : std::sqrt(limit / s); }
 
 /// Residual (u, v, disparity), px, of a point in the camera frame and its derivatives. The disparity row is zero when
 /// the observation has none. For z <= 0 everything is zero and `valid` is false.

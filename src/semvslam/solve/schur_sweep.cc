@@ -41,7 +41,9 @@ SchurSweep::SchurSweep(const BaProblem& problem, double pixel_limit, double disp
   couplings_.resize(edges_.size());
   eliminated_.resize(points_.size());
   z_.resize(poses_.size());
-  z_edge_.resize(poses_.size());
+  z_pose_.resize(poses_.size());
+  schur_rhs_.resize(free_poses_.size());
+  schur_.resize(free_poses_.size() * (free_poses_.size() + 1) / 2);
   const auto n = static_cast<Eigen::Index>(6 * free_poses_.size());
   reduced_.resize(n, n);
   reduced_rhs_.resize(n);
@@ -167,30 +169,36 @@ void SchurSweep::eliminate_point(std::size_t point, double lambda) {
     if (e.free < 0) continue;
     PoseNormal& pn = pose_normals_[static_cast<std::size_t>(e.free)];
     add_pose_normal(m, c.p.x(), c.p.y(), c.p.z(), pn.h, pn.g);
-    z_edge_[count++] = k;
+    z_pose_[count] = static_cast<std::uint32_t>(e.free);
+    Columns3& w = z_[count++];
+    for (int col = 0; col < 3; ++col) {
+      const Eigen::Vector3d n = c.n.col(col), pn_cross = c.p.cross(n);
+      w[static_cast<std::size_t>(col)] = Lanes{n[0], n[1], n[2], pn_cross[0], pn_cross[1], pn_cross[2], 0, 0};
+    }
   }
-  if (!el.factor(h, lambda)) return;
+  if (el.factor(h, lambda)) subtract_schur(el, count);
+}
+
+void SchurSweep::subtract_schur(const Eliminated& el, std::size_t count) {
   for (std::size_t a = 0; a < count; ++a) {
-    const Edge& e = edges_[z_edge_[a]];
-    const Coupling& c = couplings_[z_edge_[a]];
-    Matrix63 w;
-    w.topRows<3>() = c.n;
-    for (int col = 0; col < 3; ++col) w.block<3, 1>(3, col) = c.p.cross(c.n.col(col));
-    Matrix63& z = z_[a];
-    z.col(0) = w.col(0) * el.inverse_l00;
-    z.col(1) = (w.col(1) - z.col(0) * el.l10) * el.inverse_l11;
-    z.col(2) = (w.col(2) - z.col(0) * el.l20 - z.col(1) * el.l21) * el.inverse_l22;
-    const Eigen::Index row = 6 * e.free;
-    reduced_rhs_.segment<6>(row).noalias() -= z * el.y;
-    for (std::size_t b = 0; b <= a; ++b)
-      reduced_.block<6, 6>(row, 6 * edges_[z_edge_[b]].free).noalias() -= z * z_[b].transpose();
+    Columns3& z = z_[a];
+    z[0] = z[0] * el.inverse_l00;
+    z[1] = (z[1] - z[0] * el.l10) * el.inverse_l11;
+    z[2] = (z[2] - z[0] * el.l20 - z[1] * el.l21) * el.inverse_l22;
+    const std::size_t row = z_pose_[a];
+    schur_rhs_[row] += z[0] * el.y[0] + z[1] * el.y[1] + z[2] * el.y[2];
+    for (std::size_t b = 0; b <= a; ++b) {
+      Columns6& block = schur_[row * (row + 1) / 2 + z_pose_[b]];
+      const Columns3& zb = z_[b];
+      for (std::size_t col = 0; col < 6; ++col) block[col] += z[0] * zb[0][col] + z[1] * zb[1][col] + z[2] * zb[2][col];
+    }
   }
 }
 
 bool SchurSweep::solve(double lambda) {
   lambda_ = lambda;
-  reduced_.setZero();
-  reduced_rhs_.setZero();
+  std::fill(schur_.begin(), schur_.end(), Columns6{});
+  std::fill(schur_rhs_.begin(), schur_rhs_.end(), Lanes{});
   std::fill(pose_normals_.begin(), pose_normals_.end(), PoseNormal{});
   for (std::size_t i = 0; i < points_.size(); ++i) eliminate_point(i, lambda);
   return solve_reduced(lambda);
@@ -204,8 +212,14 @@ bool SchurSweep::solve_reduced(double lambda) {
     Matrix6 h = unpack_pose_normal(pose_normals_[j].h);
     // A pose without active edges stays where it is.
     for (int d = 0; d < 6; ++d) h(d, d) = h(d, d) > 0 ? h(d, d) * (1 + lambda) : 1.0;
+    for (std::size_t k = 0; k <= j; ++k) {
+      const Columns6& block = schur_[j * (j + 1) / 2 + k];
+      for (Eigen::Index c = 0; c < 6; ++c)
+        for (Eigen::Index r = 0; r < 6; ++r)
+          reduced_(row + r, static_cast<Eigen::Index>(6 * k) + c) = -block[static_cast<std::size_t>(c)][r];
+    }
     reduced_.block<6, 6>(row, row) += h;
-    reduced_rhs_.segment<6>(row) += Eigen::Map<const Vector6>(pose_normals_[j].g);
+    for (int d = 0; d < 6; ++d) reduced_rhs_[row + d] = pose_normals_[j].g[d] - schur_rhs_[j][d];
   }
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> solver(reduced_);
   if (solver.info() != Eigen::Success) return false;

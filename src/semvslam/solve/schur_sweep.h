@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "semvslam/solve/bundle_adjustment.h"
+#include "semvslam/solve/lanes.h"
 #include "semvslam/solve/residuals.h"
 
 namespace semvslam {
@@ -42,7 +44,10 @@ class SchurSweep {
  private:
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  using Matrix63 = Eigen::Matrix<double, 6, 3>;
+
+  // Columns of matrices with six rows; two rows of padding.
+  using Columns3 = std::array<Lanes, 3>;
+  using Columns6 = std::array<Lanes, 6>;
 
   struct PoseMatrix {
     Eigen::Matrix3d r;
@@ -80,6 +85,7 @@ class SchurSweep {
   void switch_off_weak_points();
   double edge_cost(const Edge& e, const Eigen::Vector3d& p) const;
   void eliminate_point(std::size_t point, double lambda);
+  void subtract_schur(const Eliminated& el, std::size_t count);
   bool solve_reduced(double lambda);
   Eigen::Vector3d substitute_back(std::size_t point) const;
 
@@ -95,9 +101,11 @@ class SchurSweep {
   std::vector<PoseNormal> pose_normals_;
   std::vector<Coupling> couplings_;  // per edge, those of free poses only are used
   std::vector<Eliminated> eliminated_;
-  std::vector<Matrix63> z_;  // of the point at hand: W L^-T per edge
-  std::vector<std::uint32_t> z_edge_;
-  Eigen::MatrixXd reduced_;  // lower triangle
+  std::vector<Columns3> z_;            // of the point at hand: W L^-T per free edge
+  std::vector<std::uint32_t> z_pose_;  // and its free pose, ascending
+  std::vector<Columns6> schur_;        // sums of Z Z^T: block (a, b), a >= b, at a (a + 1) / 2 + b
+  std::vector<Lanes> schur_rhs_;       // sums of Z y
+  Eigen::MatrixXd reduced_;            // lower triangle
   Eigen::VectorXd reduced_rhs_, pose_step_;
   double lambda_ = 0, predicted_gain_ = 0;
 };

@@ -1,6 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "semvslam/solve/bundle_adjustment.h"
+#include "semvslam/solve/bundle_adjustment_ceres.h"
 #include "semvslam/solve/pose_optimizer.h"
 #include "semvslam/solve/synthetic_bundle.h"
 
@@ -39,21 +40,32 @@ synthetic::Bundle local_bundle(int poses, int fixed, int points) {
   return synthetic::make_bundle(o);
 }
 
-void bm_adjust_bundle(benchmark::State& state) {
+// The local map of tracking a room (12 free key frames), and a larger one.
+template <typename Solver>
+void run_bundle(benchmark::State& state, Solver solver) {
   const synthetic::Bundle bundle = local_bundle(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)),
                                                 static_cast<int>(state.range(2)));
   std::vector<std::uint8_t> inlier;
   BaSummary summary;
   for (auto _ : state) {
     BaProblem problem = bundle.problem;
-    summary = adjust_bundle(problem, {}, inlier);
+    summary = solver(problem, inlier);
     benchmark::DoNotOptimize(problem.poses.data());
   }
   state.counters["edges"] = static_cast<double>(bundle.problem.edges.size());
   state.counters["iterations"] = summary.iterations;
   state.counters["final_cost"] = summary.final_cost;
 }
-BENCHMARK(bm_adjust_bundle)->Args({24, 12, 2000})->Args({60, 20, 5000})->Unit(benchmark::kMillisecond);
+
+void bm_adjust_bundle(benchmark::State& state) {
+  run_bundle(state, [](BaProblem& p, std::vector<std::uint8_t>& inlier) { return adjust_bundle(p, {}, inlier); });
+}
+BENCHMARK(bm_adjust_bundle)->Args({24, 12, 1600})->Args({60, 20, 5000})->Unit(benchmark::kMillisecond);
+
+void bm_adjust_bundle_ceres(benchmark::State& state) {
+  run_bundle(state, [](BaProblem& p, std::vector<std::uint8_t>& inlier) { return adjust_bundle_ceres(p, {}, inlier); });
+}
+BENCHMARK(bm_adjust_bundle_ceres)->Args({24, 12, 1600})->Args({60, 20, 5000})->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace semvslam
