@@ -2,108 +2,29 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <numeric>
-#include <opencv2/features2d.hpp>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "semvslam/feature/brief_pattern.h"
+#include "semvslam/feature/corner_refinement.h"
 #include "semvslam/feature/corner_selection.h"
+#include "semvslam/feature/fast_corners.h"
+#include "semvslam/feature/oriented_brief.h"
+#include "semvslam/feature/pyramid_filters.h"
 
 namespace semvslam {
 namespace {
 
-constexpr int kPatchRadius = 15;           // of the intensity centroid
-constexpr int kBorder = kPatchRadius + 1;  // a corner's patch and its subpixel window lie inside the level
-constexpr int kMinSide = 64;               // of the image
-constexpr float kTurn = 2 * std::numbers::pi_v<float>;
-static_assert(kBriefRadius <= kPatchRadius);
+constexpr int kBorder = kPatchRadius + kSmoothReach;  // a corner's smoothed patch lies inside the level
+constexpr int kMinSide = 64;                          // of the image
+static_assert(kBriefRadius <= kPatchRadius && kRefineMargin <= kBorder);
 
-/// Half width of the patch's circle in row dy.
-std::array<int, kPatchRadius + 1> circle_half_widths() {
-  std::array<int, kPatchRadius + 1> widths{};
-  for (int dy = 0; dy <= kPatchRadius; ++dy) {
-    widths[static_cast<std::size_t>(dy)] =
-        static_cast<int>(std::sqrt((kPatchRadius + 0.5) * (kPatchRadius + 0.5) - dy * dy));
-  }
-  return widths;
-}
-
-/// Direction from the patch's centre to its intensity centroid (Rosin, CVIU 1999), in [0, 2 pi).
-float patch_angle_rad(const cv::Mat& image, int x, int y) {
-  static const std::array<int, kPatchRadius + 1> widths = circle_half_widths();
-  int m01 = 0, m10 = 0;
-  for (int dy = -kPatchRadius; dy <= kPatchRadius; ++dy) {
-    const std::uint8_t* row = image.ptr<std::uint8_t>(y + dy) + x;
-    const int half = widths[static_cast<std::size_t>(std::abs(dy))];
-    int sum = 0;
-    for (int dx = -half; dx <= half; ++dx) {
-      sum += row[dx];
-      m10 += dx * row[dx];
-    }
-    m01 += dy * sum;
-  }
-  const float angle = std::atan2(static_cast<float>(m01), static_cast<float>(m10));
-  const float positive = angle < 0 ? angle + kTurn : angle;
-  return positive < kTurn ? positive : 0.f;
-}
-
-Descriptor describe(const cv::Mat& blurred, int x, int y, float angle_rad) {
-  const float c = std::cos(angle_rad), s = std::sin(angle_rad);
-  const std::uint8_t* centre = blurred.ptr<std::uint8_t>(y) + x;
-  const auto stride = static_cast<std::ptrdiff_t>(blurred.step[0]);
-  const auto at = [&](int px, int py) {
-    const auto fx = static_cast<float>(px), fy = static_cast<float>(py);
-    const long rx = std::lround(c * fx - s * fy), ry = std::lround(s * fx + c * fy);
-    return centre[ry * stride + rx];
-  };
-  Descriptor descriptor{};
-  const auto& tests = brief_pattern();
-  for (std::size_t i = 0; i < tests.size(); ++i) {
-    const BriefTest& t = tests[i];
-    if (at(t.ax, t.ay) < at(t.bx, t.by)) descriptor[i / 64] |= std::uint64_t{1} << (i % 64);
-  }
-  return descriptor;
-}
-
-/// Position of the extremum of the parabola through (-1, a), (0, b), (1, c), within half a pixel.
-float parabola_peak(float a, float b, float c) {
-  const float curvature = a - 2 * b + c;
-  if (!(curvature < 0)) return 0;
-  return std::clamp((a - c) / (2 * curvature), -0.5f, 0.5f);
-}
-
-/// Harris' corner score over a 7x7 window around each of the 3x3 pixels, then a parabola in x and in y.
-cv::Point2f subpixel_offset(const cv::Mat& image, int x, int y) {
-  constexpr int kReach = 4;
-  float xx[9][9], xy[9][9], yy[9][9];
-  for (int j = 0; j < 9; ++j) {
-    const std::uint8_t* row = image.ptr<std::uint8_t>(y + j - kReach) + x - kReach;
-    const std::uint8_t* up = image.ptr<std::uint8_t>(y + j - kReach - 1) + x - kReach;
-    const std::uint8_t* down = image.ptr<std::uint8_t>(y + j - kReach + 1) + x - kReach;
-    for (int i = 0; i < 9; ++i) {
-      const auto gx = static_cast<float>(row[i + 1] - row[i - 1]), gy = static_cast<float>(down[i] - up[i]);
-      xx[j][i] = gx * gx;
-      xy[j][i] = gx * gy;
-      yy[j][i] = gy * gy;
-    }
-  }
-  float score[3][3];
-  for (int j = 0; j < 3; ++j) {
-    for (int i = 0; i < 3; ++i) {
-      float a = 0, b = 0, c = 0;
-      for (int v = 0; v < 7; ++v) {
-        for (int u = 0; u < 7; ++u) {
-          a += xx[j + v][i + u];
-          b += xy[j + v][i + u];
-          c += yy[j + v][i + u];
-        }
-      }
-      score[j][i] = a * c - b * b - 0.04f * (a + c) * (a + c);
-    }
-  }
-  return {parabola_peak(score[1][0], score[1][1], score[1][2]), parabola_peak(score[0][1], score[1][1], score[2][1])};
+/// Whether a position of a level (continuous, pixel centres at integers) falls on a set pixel of the mask of level 0.
+bool is_masked(const cv::Mat& mask, const cv::Size& level, float x, float y) {
+  const float x_ratio = static_cast<float>(mask.cols) / static_cast<float>(level.width);
+  const float y_ratio = static_cast<float>(mask.rows) / static_cast<float>(level.height);
+  const int mx = std::min(static_cast<int>((x + 0.5f) * x_ratio), mask.cols - 1);
+  const int my = std::min(static_cast<int>((y + 0.5f) * y_ratio), mask.rows - 1);
+  return mask.ptr<std::uint8_t>(my)[mx] != 0;
 }
 
 }  // namespace
@@ -115,18 +36,23 @@ std::vector<float> level_scales(const OrbOptions& options) {
 }
 
 struct OrbExtractor::Impl {
-  explicit Impl(const OrbOptions& o) : options(o), scales(level_scales(o)) {}
+  explicit Impl(const OrbOptions& o) : options(o), scales(level_scales(o)), selector(o.cell_px) {}
 
   void build_pyramid(const cv::Mat& gray);
   void detect(std::size_t level, const cv::Mat& mask);
   void share_budget();
-  void describe_level(std::size_t level, OrbFeatures& out);
+  void describe_level(std::size_t level, const cv::Mat& mask, OrbFeatures& out);
 
   OrbOptions options;
   std::vector<float> scales;
   std::vector<cv::Mat> pyramid;
-  cv::Mat blurred;
-  std::vector<cv::KeyPoint> fast;
+  Shrinker shrinker;
+  Smoother smoother;
+  cv::Mat smooth;  // of one level at a time, with the size of level 0: one row stride for all
+  OrientedBrief brief;
+  cv::Mat taken;                  // pixels of the present level that have a feature already; else 0
+  std::vector<cv::Point> places;  // of those
+  FastDetector fast;
   std::vector<std::vector<Corner>> corners;  // per level
   std::vector<Corner> selected;
   std::vector<int> budget;  // corners to take per level
@@ -150,7 +76,8 @@ void OrbExtractor::Impl::build_pyramid(const cv::Mat& gray) {
     if (l == 0) {
       pyramid[0] = gray;
     } else {
-      cv::resize(pyramid[l - 1], pyramid[l], sizes[l], 0, 0, cv::INTER_LINEAR);
+      pyramid[l].create(sizes[l], CV_8UC1);
+      shrinker.shrink(pyramid[l - 1], pyramid[l]);
     }
   }
 }
@@ -159,22 +86,11 @@ void OrbExtractor::Impl::detect(std::size_t level, const cv::Mat& mask) {
   const cv::Mat& image = pyramid[level];
   std::vector<Corner>& found = corners[level];
   found.clear();
-  const cv::Rect inside(kBorder - 3, kBorder - 3, image.cols - 2 * (kBorder - 3), image.rows - 2 * (kBorder - 3));
-  const int low = std::min(options.fast_threshold_low, options.fast_threshold);
-  cv::FAST(image(inside), fast, low, true);
-  const double x_ratio = static_cast<double>(pyramid[0].cols) / image.cols;
-  const double y_ratio = static_cast<double>(pyramid[0].rows) / image.rows;
-  for (const cv::KeyPoint& k : fast) {
-    const int x = static_cast<int>(k.pt.x) + inside.x, y = static_cast<int>(k.pt.y) + inside.y;
-    if (!mask.empty()) {
-      const int mx = std::min(static_cast<int>((x + 0.5) * x_ratio), mask.cols - 1);
-      const int my = std::min(static_cast<int>((y + 0.5) * y_ratio), mask.rows - 1);
-      if (mask.at<std::uint8_t>(my, mx)) continue;
-    }
-    found.push_back(
-        {static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(k.response)});
+  fast.detect(image, kBorder, std::min(options.fast_threshold_low, options.fast_threshold), found);
+  if (!mask.empty()) {
+    std::erase_if(found, [&](const Corner& c) { return is_masked(mask, image.size(), c.x, c.y); });
   }
-  selector.drop_weak(found, image.cols, image.rows, options.cell_px, options.fast_threshold);
+  selector.drop_weak(found, image.cols, image.rows, options.fast_threshold);
 }
 
 /// Levels get shares in proportion to 1 / scale (Rublee et al.); what a level cannot fill goes to the others.
@@ -207,24 +123,36 @@ void OrbExtractor::Impl::share_budget() {
   }
 }
 
-void OrbExtractor::Impl::describe_level(std::size_t level, OrbFeatures& out) {
+void OrbExtractor::Impl::describe_level(std::size_t level, const cv::Mat& mask, OrbFeatures& out) {
   const cv::Mat& image = pyramid[level];
-  selector.select(corners[level], image.cols, image.rows, budget[level], selected);
+  // Some corners are moved onto one another or onto the mask; others stand in for them.
+  const int spare = options.subpixel ? budget[level] / 8 + 8 : 0;
+  selector.select(corners[level], image.cols, image.rows, budget[level], spare, selected);
   if (selected.empty()) return;
-  cv::GaussianBlur(image, blurred, cv::Size(7, 7), 2, 2, cv::BORDER_REFLECT_101);
+  smoother.smooth(image, smooth);
   const float x_ratio = static_cast<float>(pyramid[0].cols) / static_cast<float>(image.cols);
   const float y_ratio = static_cast<float>(pyramid[0].rows) / static_cast<float>(image.rows);
+  const auto stride = static_cast<std::ptrdiff_t>(image.step[0]);
+  const cv::Rect inside(kBorder, kBorder, image.cols - 2 * kBorder, image.rows - 2 * kBorder);
   for (const Corner& c : selected) {
-    const cv::Point2f offset = options.subpixel ? subpixel_offset(image, c.x, c.y) : cv::Point2f(0, 0);
+    if (static_cast<int>(places.size()) == budget[level]) break;
+    const RefinedCorner r = options.subpixel ? refine_corner(image, c.x, c.y, inside) : RefinedCorner{c.x, c.y, 0, 0};
+    const float x = static_cast<float>(r.x) + r.dx_px, y = static_cast<float>(r.y) + r.dy_px;
+    std::uint8_t& occupied = taken.ptr<std::uint8_t>(r.y)[r.x];
+    if (occupied != 0 || (!mask.empty() && is_masked(mask, image.size(), x, y))) continue;
+    occupied = 1;
     Keypoint k;
-    k.x_px = (static_cast<float>(c.x) + offset.x + 0.5f) * x_ratio - 0.5f;
-    k.y_px = (static_cast<float>(c.y) + offset.y + 0.5f) * y_ratio - 0.5f;
+    k.x_px = (x + 0.5f) * x_ratio - 0.5f;
+    k.y_px = (y + 0.5f) * y_ratio - 0.5f;
     k.response = static_cast<float>(c.score);
     k.level = static_cast<std::uint8_t>(level);
-    k.angle_rad = patch_angle_rad(image, c.x, c.y);
+    k.angle_rad = patch_angle_rad(image.ptr<std::uint8_t>(r.y) + r.x, stride);
     out.keypoints.push_back(k);
-    out.descriptors.push_back(describe(blurred, c.x, c.y, k.angle_rad));
+    out.descriptors.push_back(brief.describe(smooth.ptr<std::uint8_t>(r.y) + r.x, k.angle_rad));
+    places.emplace_back(r.x, r.y);
   }
+  for (const cv::Point& p : places) taken.at<std::uint8_t>(p) = 0;
+  places.clear();
 }
 
 OrbExtractor::OrbExtractor(const OrbOptions& options) : impl_(std::make_unique<Impl>(options)) {
@@ -246,13 +174,17 @@ void OrbExtractor::extract(const cv::Mat& gray, const cv::Mat& mask, OrbFeatures
     throw std::invalid_argument("OrbExtractor: the image is larger than 65535");
   out.keypoints.clear();
   out.descriptors.clear();
-  impl_->pyramid.clear();
-  if (gray.cols < kMinSide || gray.rows < kMinSide) return;
+  if (gray.cols < kMinSide || gray.rows < kMinSide) return impl_->pyramid.clear();
   impl_->build_pyramid(gray);
+  if (impl_->smooth.size() != gray.size()) {
+    impl_->smooth.create(gray.size(), CV_8UC1);
+    impl_->taken = cv::Mat::zeros(gray.size(), CV_8UC1);
+  }
+  impl_->brief.set_stride(static_cast<std::ptrdiff_t>(impl_->smooth.step[0]));
   impl_->corners.resize(impl_->pyramid.size());
   for (std::size_t l = 0; l < impl_->pyramid.size(); ++l) impl_->detect(l, mask);
   impl_->share_budget();
-  for (std::size_t l = 0; l < impl_->pyramid.size(); ++l) impl_->describe_level(l, out);
+  for (std::size_t l = 0; l < impl_->pyramid.size(); ++l) impl_->describe_level(l, mask, out);
 }
 
 const std::vector<cv::Mat>& OrbExtractor::pyramid() const { return impl_->pyramid; }
