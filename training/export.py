@@ -82,6 +82,27 @@ def write_onnx(net, out, size):
     for name, m, x, given, outs, dyn in jobs:
         torch.onnx.export(m.eval(), (x,), os.path.join(out, name + ".onnx"), input_names=[given], output_names=outs, dynamic_axes=dyn,
                           opset_version=17, dynamo=False)
+        halve(os.path.join(out, name + ".onnx"))
+
+
+def halve(path):
+    """Weights as float16 with a cast behind each: half the file, the same network but for the rounding of the weights."""
+    import onnx
+    m = onnx.load(path)
+    casts, kept = [], []
+    for t in m.graph.initializer:
+        a = onnx.numpy_helper.to_array(t)
+        if a.dtype != np.float32 or a.size < 512:
+            kept.append(t)
+            continue
+        kept.append(onnx.numpy_helper.from_array(a.astype(np.float16), t.name + "_half"))
+        casts.append(onnx.helper.make_node("Cast", [t.name + "_half"], [t.name], to=onnx.TensorProto.FLOAT))
+    nodes = casts + list(m.graph.node)
+    del m.graph.initializer[:], m.graph.node[:]
+    m.graph.initializer.extend(kept)
+    m.graph.node.extend(nodes)
+    onnx.checker.check_model(m)
+    onnx.save(m, path)
 
 
 def calibration(json_path, images, size, most=200):

@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""Milliseconds of each exported graph and of the whole reference inference. On a busy machine read the minimum and the CPU time.
+
+usage: bench.py MODEL_DIR IMAGE [--threads 1 2] [--precision f32]
+"""
+import argparse
+import json
+import os
+import time
+
+import cv2
+import numpy as np
+
+import infer
+
+
+def laps(call, repeats):
+    out, busy = [], time.process_time()
+    for _ in range(repeats):
+        t = time.perf_counter()
+        call()
+        out.append((time.perf_counter() - t) * 1e3)
+    busy = (time.process_time() - busy) / repeats * 1e3
+    return f"min {min(out):6.2f}  median {np.median(out):6.2f}  CPU time, all threads {busy:6.2f}"
+
+
+def main():
+    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    a.add_argument("models")
+    a.add_argument("image")
+    a.add_argument("--threads", type=int, nargs="*", default=[1, 2])
+    a.add_argument("--precision")
+    a.add_argument("--float", action="store_true", help="the ONNX graphs instead of those that model.json names")
+    a.add_argument("--repeats", type=int, default=40)
+    o = a.parse_args()
+    with open(os.path.join(o.models, "model.json")) as f:
+        m = json.load(f)
+    files = {g: g + ".onnx" if o.float else m[g] for g in ("trunk", "box", "mask")}
+    bgr = cv2.imread(o.image)
+    for threads in o.threads:
+        s = infer.Segmenter(infer.OpenVino(o.models, threads, o.precision, **files))
+        x = np.zeros((1, 3, *s.g.size), np.float32)
+        boxes, masks = np.zeros((50, 7, 7, 96), np.float32), np.zeros((4, 14, 14, 96), np.float32)
+        for name, call in (("trunk", lambda: s.g.trunk(x)), ("box head, 50 regions", lambda: s.g.box(boxes)),
+                           ("mask head, 4 regions", lambda: s.g.mask(masks))):
+            call()
+            print(f"{threads} threads  {name:22} {laps(call, o.repeats)}", flush=True)
+        print(f"{threads} threads  {'all, this reference':22} {laps(lambda: s(bgr, 0.5), 10)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
