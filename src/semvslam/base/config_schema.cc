@@ -240,7 +240,7 @@ Status ConfigSchema::load_yaml(const std::string& text, const std::string& origi
     for (const Assignment& a : flat.found) find(a.key)->assign(a.value);
     return Status::success();
   } catch (const YAML::Exception& e) {
-    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, e.msg));
+    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, quoted(e.msg)));
   }
 }
 

@@ -65,9 +65,10 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+/// Foreign text for a message: one line of at most 80 characters.
 std::string printable(std::string_view text) {
   std::string out;
-  for (char c : text.substr(0, 40)) out += c >= ' ' && c <= '~' ? c : '?';
+  for (char c : text.substr(0, 80)) out += c >= ' ' && c <= '~' ? c : '?';
   return out;
 }
 
@@ -149,7 +150,8 @@ Result<Camera> parse_camera(const std::string& text, const std::string& name) {
       if (Status s = read_entry(entry.first.Scalar(), entry.second, line, name, keys, seen); !s) return s.error();
     }
   } catch (const YAML::Exception& e) {
-    return Error{ErrorCode::kInvalidInput, fmt::format("{}:{}: not valid YAML: {}", name, e.mark.line + 1, e.msg)};
+    return Error{ErrorCode::kInvalidInput,
+                 fmt::format("{}:{}: not valid YAML: {}", name, e.mark.line + 1, printable(e.msg))};
   }
   for (const Key& key : keys) {
     const bool set = std::any_of(seen.begin(), seen.end(), [&](const Key* k) { return k->field == key.field; });
