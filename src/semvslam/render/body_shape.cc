@@ -105,7 +105,7 @@ ImplicitShape bare_arms() {
 ImplicitShape bare_legs() {
   ImplicitShape s;
   for (const float x : {-1.f, 1.f}) {
-    s.cone({x * 0.098f, 0.005f, 0.72f}, 0.066f, {x * 0.105f, 0.008f, 0.50f}, 0.048f, 0.04f);
+    s.cone({x * 0.104f, 0.008f, 0.56f}, 0.050f, {x * 0.105f, 0.006f, 0.50f}, 0.046f, 0.04f);  // the rest is under the skirt
     s.cone({x * 0.105f, -0.005f, 0.48f}, 0.046f, {x * 0.110f, -0.018f, 0.34f}, 0.052f, 0.04f);
     s.cone({x * 0.110f, -0.018f, 0.34f}, 0.052f, {x * 0.115f, -0.02f, 0.10f}, 0.034f, 0.04f);
   }
@@ -211,15 +211,15 @@ ImplicitShape shoes_shape() {
 
 std::vector<BodyPart> make_body_parts(const PersonLook& look, SceneBuilder& builder) {
   using Chart = BodyPart::Chart;
-  const std::uint16_t head = builder.add_texture(paint_head({512, 256}, look));
-  const std::uint16_t skin = builder.add_texture(paint_skin({128, 128}, look));
-  const std::uint16_t top = builder.add_texture(paint_top({1024, 512}, look));
-  const std::uint16_t bottom = builder.add_texture(paint_bottom({1024, 512}, look));
-  const std::uint16_t shoes = builder.add_texture(paint_material({128, 128}, look.shoes, 0.35f, static_cast<std::uint32_t>(look.seed)));
+  const std::uint16_t head = builder.add_texture([look] { return paint_head({512, 256}, look); });
+  const std::uint16_t skin = builder.add_texture([look] { return paint_skin({128, 128}, look); });
+  const std::uint16_t top = builder.add_texture([look] { return paint_top({1024, 512}, look); });
+  const std::uint16_t bottom = builder.add_texture([look] { return paint_bottom({1024, 512}, look); });
+  const std::uint16_t shoes = builder.add_texture([look] { return paint_material({128, 128}, look.shoes, 0.35f, static_cast<std::uint32_t>(look.seed)); });
   std::vector<BodyPart> parts;
   parts.push_back({Chart::kHead, head_shape(look), 0.0075f, head, 0.3, false});
   if (look.hair_style != PersonLook::Hair::kBald) {
-    parts.push_back({Chart::kBox, hair_shape(look), 0.010f, builder.add_texture(paint_hair({256, 256}, look)), 0.25, false});
+    parts.push_back({Chart::kBox, hair_shape(look), 0.010f, builder.add_texture([look] { return paint_hair({256, 256}, look); }), 0.25, false});
   }
   parts.push_back({Chart::kBox, hands_shape(), 0.0075f, skin, 0.2, false});
   if (!look.long_sleeves) parts.push_back({Chart::kBox, bare_arms(), 0.014f, skin, 0.2, false});

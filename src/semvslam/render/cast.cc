@@ -72,10 +72,10 @@ void Cast::build_item(Member& member, SceneBuilder& builder, std::uint64_t seed)
   builder.begin_mesh();
   member.item_mesh = builder.mesh_index();
   auto plain = [&](const cv::Vec3f& tone) {
-    return Skin{builder.add_texture(paint_material({256, 256}, tone, 0.3f, static_cast<std::uint32_t>(random.bits()))), {0.4, 0.4}, {0, 0}, false};
+    return Skin{builder.add_texture([tone, s = random.bits32()] { return paint_material({256, 256}, tone, 0.3f, s); }), {0.4, 0.4}, {0, 0}, false};
   };
   if (member.item == Item::kCarton) {
-    const Skin skin{builder.add_texture(paint_cardboard({512, 512}, random.bits())), {0, 0}, {0, 0}, false};
+    const Skin skin{builder.add_texture([s = random.bits()] { return paint_cardboard({512, 512}, s); }), {0, 0}, {0, 0}, false};
     builder.box(on_plan(0, 0.44, 1.01), {0.36, 0.30, 0.26}, skin);
   } else if (member.item == Item::kSuitcase) {
     const Skin shell = plain(hue_colour(random.uniform(), 0.7, random.uniform(0.3, 0.7))), dark = plain({45, 42, 40});
@@ -88,7 +88,7 @@ void Cast::build_item(Member& member, SceneBuilder& builder, std::uint64_t seed)
     }
     builder.box(here * on_plan(0, 0, 0.69), {0.03, 0.22, 0.025}, dark);
   } else {
-    const Skin wood{builder.add_texture(paint_wood({256, 256}, {60, 100, 150}, 1, static_cast<std::uint32_t>(random.bits()))), {0.4, 0.4}, {0, 0}, true};
+    const Skin wood{builder.add_texture([s = random.bits32()] { return paint_wood({256, 256}, {60, 100, 150}, 1, s); }), {0.4, 0.4}, {0, 0}, true};
     const SE3 here = on_plan(0, 0.46, 0.56, 180);
     builder.box(here * on_plan(0, 0, 0.44), {0.38, 0.38, 0.03}, wood);
     for (const double x : {-0.165, 0.165}) {

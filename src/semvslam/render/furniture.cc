@@ -24,26 +24,26 @@ SE3 on_plan(double x_m, double y_m, double z_m, double turn_deg) {
 }
 
 Furnisher::Furnisher(SceneBuilder& builder, std::uint64_t seed) : builder_(builder), random_(mix64(seed, 71)) {
-  auto noise_seed = [&] { return static_cast<std::uint32_t>(random_.bits()); };
-  dark_wood_ = builder.add_texture(paint_wood({512, 512}, {48, 78, 118}, 1, noise_seed()));
-  light_wood_ = builder.add_texture(paint_wood({512, 512}, {128, 172, 212}, 1, noise_seed()));
-  white_ = builder.add_texture(paint_material({256, 256}, {214, 218, 220}, 0.08f, noise_seed()));
-  black_ = builder.add_texture(paint_material({256, 256}, {40, 38, 37}, 0.35f, noise_seed()));
-  grey_ = builder.add_texture(paint_material({256, 256}, {128, 124, 120}, 0.2f, noise_seed()));
-  metal_ = builder.add_texture(paint_material({256, 256}, {165, 165, 162}, 0.15f, noise_seed()));
-  terracotta_ = builder.add_texture(paint_material({256, 256}, {70, 100, 170}, 0.3f, noise_seed()));
-  paper_edge_ = builder.add_texture(paint_wood({256, 64}, {185, 205, 215}, 1, noise_seed()));
+  dark_wood_ = builder.add_texture([s = random_.bits32()] { return paint_wood({512, 512}, {48, 78, 118}, 1, s); });
+  light_wood_ = builder.add_texture([s = random_.bits32()] { return paint_wood({512, 512}, {128, 172, 212}, 1, s); });
+  white_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {214, 218, 220}, 0.08f, s); });
+  black_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {40, 38, 37}, 0.35f, s); });
+  grey_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {128, 124, 120}, 0.2f, s); });
+  metal_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {165, 165, 162}, 0.15f, s); });
+  terracotta_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {70, 100, 170}, 0.3f, s); });
+  paper_edge_ = builder.add_texture([s = random_.bits32()] { return paint_wood({256, 64}, {185, 205, 215}, 1, s); });
   for (auto& id : fabric_) {
     const double hue = random_.uniform();
-    id = builder.add_texture(paint_fabric({256, 256}, hue_colour(hue, 0.5, random_.uniform(0.25, 0.6)),
-                                          hue_colour(hue, 0.6, 0.3), noise_seed()));
+    id = builder.add_texture([hue, value = random_.uniform(0.25, 0.6), s = random_.bits32()] {
+      return paint_fabric({256, 256}, hue_colour(hue, 0.5, value), hue_colour(hue, 0.6, 0.3), s);
+    });
   }
-  for (auto& id : leaf_) id = builder.add_texture(paint_leaf({64, 256}, random_.bits()), false);
-  for (auto& id : spines_) id = builder.add_texture(paint_spines({2048, 256}, kSpinesPerImage, random_.bits()), false);
-  for (auto& id : carton_) id = builder.add_texture(paint_cardboard({512, 512}, random_.bits()));
-  for (auto& id : label_) id = builder.add_texture(paint_label({256, 128}, random_.bits()));
-  for (auto& id : page_) id = builder.add_texture(paint_page({512, 724}, random_.bits()), false);
-  keyboard_ = builder.add_texture(paint_keyboard({512, 192}, random_.bits()), false);
+  for (auto& id : leaf_) id = builder.add_texture([s = random_.bits()] { return paint_leaf({64, 256}, s); }, false);
+  for (auto& id : spines_) id = builder.add_texture([s = random_.bits()] { return paint_spines({2048, 256}, kSpinesPerImage, s); }, false);
+  for (auto& id : carton_) id = builder.add_texture([s = random_.bits()] { return paint_cardboard({512, 512}, s); });
+  for (auto& id : label_) id = builder.add_texture([s = random_.bits()] { return paint_label({256, 128}, s); });
+  for (auto& id : page_) id = builder.add_texture([s = random_.bits()] { return paint_page({512, 724}, s); }, false);
+  keyboard_ = builder.add_texture([s = random_.bits()] { return paint_keyboard({512, 192}, s); }, false);
 }
 
 Skin Furnisher::wood(bool dark, bool turned) {
@@ -62,7 +62,7 @@ void Furnisher::row_of_books(const SE3& pose, double width_m, double height_m, d
     const Skin spine = part_of(image, static_cast<double>(number) / kSpinesPerImage, 0, 1.0 / kSpinesPerImage, 1, thick, tall);
     Skin cover = part_of(image, (number + 0.1) / kSpinesPerImage, 0.02, 0.06 / kSpinesPerImage, 0.02, deep, tall);
     const double front = -depth_m / 2 + random_.uniform(0.005, 0.04);
-    builder_.box(pose * on_plan(x + thick / 2, front + deep / 2), {thick * 0.97, deep, tall}, cover, spine, plain(paper_edge_));
+    builder_.box(pose * on_plan(x + thick / 2, front + deep / 2), {thick * 0.97, deep, tall}, cover, spine, plain(paper_edge_), false);
     x += thick;
   }
 }
@@ -169,7 +169,7 @@ void Furnisher::sofa(const SE3& pose, double width_m) {
 void Furnisher::monitor(const SE3& pose, double width_m) {
   builder_.begin_mesh();
   const double height = width_m * 0.6;
-  const std::uint16_t screen = builder_.add_texture(paint_screen({512, 320}, random_.bits()), false);
+  const std::uint16_t screen = builder_.add_texture([s = random_.bits()] { return paint_screen({512, 320}, s); }, false);
   builder_.box(pose, {0.2, 0.16, 0.012}, plain(black_));
   builder_.box(pose * on_plan(0, 0.02, 0.01), {0.045, 0.03, 0.2}, plain(black_));
   const SE3 head = pose * on_plan(0, -0.01, 0.12);
@@ -272,13 +272,13 @@ void Furnisher::clutter(const SE3& pose, double width_m, double depth_m, int thi
 void Furnisher::poster(const SE3& pose, double width_m, double height_m) {
   builder_.begin_mesh();
   const int width_px = std::clamp(static_cast<int>(width_m * 512), 128, 512);
-  const std::uint16_t image = builder_.add_texture(paint_poster({width_px, static_cast<int>(width_px * height_m / width_m)}, random_.bits()), false);
-  builder_.box(pose * on_plan(0, -0.006), {width_m, 0.01, height_m}, plain(black_), Skin{image, {0, 0}, {0, 0}, false}, plain(black_));
+  const std::uint16_t image = builder_.add_texture([size = cv::Size(width_px, static_cast<int>(width_px * height_m / width_m)), s = random_.bits()] { return paint_poster(size, s); }, false);
+  builder_.box(pose * on_plan(0, -0.006), {width_m, 0.01, height_m}, plain(black_), Skin{image, {0, 0}, {0, 0}, false}, plain(black_), false);
 }
 
 void Furnisher::whiteboard(const SE3& pose, double width_m, double height_m) {
   builder_.begin_mesh();
-  const std::uint16_t image = builder_.add_texture(paint_whiteboard({1024, 512}, random_.bits()), false);
+  const std::uint16_t image = builder_.add_texture([s = random_.bits()] { return paint_whiteboard({1024, 512}, s); }, false);
   builder_.box(pose * on_plan(0, -0.01), {width_m, 0.018, height_m}, plain(metal_), Skin{image, {0, 0}, {0, 0}, false}, plain(metal_));
   builder_.box(pose * on_plan(0, -0.045, -0.02), {width_m * 0.8, 0.06, 0.015}, plain(metal_));
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <vector>
 
 #include "semvslam/render/texture.h"
@@ -17,8 +17,8 @@ struct LightAtlas {
 
   /// Bilinear; (0, 0) = centre of the first texel; clamped at the border.
   Colour4 sample(float column, float row) const {
-    column = std::fmin(std::fmax(column, 0.f), static_cast<float>(width - 1) - 1e-3f);
-    row = std::fmin(std::fmax(row, 0.f), static_cast<float>(height - 1) - 1e-3f);
+    column = std::min(std::max(column, 0.f), static_cast<float>(width - 1) - 1e-3f);
+    row = std::min(std::max(row, 0.f), static_cast<float>(height - 1) - 1e-3f);
     const int x = static_cast<int>(column), y = static_cast<int>(row);
     const float ax = column - static_cast<float>(x), ay = row - static_cast<float>(y);
     const Colour4* upper = texels.data() + static_cast<std::size_t>(y) * width + x;

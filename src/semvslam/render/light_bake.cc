@@ -11,8 +11,8 @@ namespace {
 constexpr int kLeafFaces = 4;
 constexpr float kLift_m = 0.012f;        // rays start above the surface: rugs and skirting do not blacken what they lie on
 constexpr float kAmbientReach_m = 0.7f;
-constexpr float kAmbient = 0.34f, kBounce = 0.10f;
-constexpr int kAmbientRays = 10;
+constexpr float kAmbient = 0.46f, kBounce = 0.12f;
+constexpr int kAmbientRays = 8;
 
 float brightness(const Colour4& c) { return 0.11f * c[0] + 0.59f * c[1] + 0.30f * c[2]; }
 
@@ -103,39 +103,49 @@ bool ShadowTester::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d
   return false;
 }
 
-Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& normal, const ShadowTester* tester) const {
-  const Eigen::Vector3d lifted = position + normal * kLift_m;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  constexpr double kPlaces[4][2] = {{-0.6, -0.3}, {0.3, -0.7}, {0.6, 0.4}, {-0.3, 0.6}};
-  for (const AreaLight& light : lights_) {
-    const double area = 4 * light.half_u.norm() * light.half_v.norm();
-    for (const auto& place : kPlaces) {
-      const Eigen::Vector3d to = light.centre + place[0] * light.half_u + place[1] * light.half_v - lifted;
-      const double distance = to.norm();
-      const Eigen::Vector3d direction = to / distance;
-      const double facing = normal.dot(direction), leaving = -light.normal.dot(direction);
+LightModel::LightModel(const std::vector<AreaLight>& lights) {
+  for (const AreaLight& l : lights) {
+    sources_.push_back({l.centre.cast<float>(), l.half_u.cast<float>(), l.half_v.cast<float>(), l.normal.cast<float>(), l.radiance.cast<float>(),
+                        static_cast<float>(4 * l.half_u.norm() * l.half_v.norm())});
+  }
+}
+
+Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& normal_d, const ShadowTester* tester) const {
+  const Eigen::Vector3f normal = normal_d.cast<float>(), lifted = position.cast<float>() + normal * kLift_m;
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  constexpr float kPlaces[4][2] = {{-0.6f, -0.3f}, {0.6f, 0.4f}, {0.3f, -0.7f}, {-0.3f, 0.6f}};
+  for (const Source& light : sources_) {
+    const Eigen::Vector3f to_middle = light.centre - lifted;
+    const float middle = to_middle.squaredNorm();
+    const int places = middle < 5 ? 4 : middle < 16 ? 2 : 1;  // far lamps are nearly points: fewer rays
+    for (int i = 0; i < places; ++i) {
+      Eigen::Vector3f to = to_middle;
+      if (places > 1) to += kPlaces[i][0] * light.half_u + kPlaces[i][1] * light.half_v;
+      const float distance = to.norm();
+      const Eigen::Vector3f direction = to / distance;
+      const float facing = normal.dot(direction), leaving = -light.normal.dot(direction);
       if (facing <= 0 || leaving <= 0) continue;
-      const double strength = facing * leaving * area / (4 * M_PI * (distance * distance + 0.2));
-      if (strength < 1e-3) continue;
-      if (tester && tester->blocked(lifted.cast<float>(), direction.cast<float>(), static_cast<float>(distance) - 0.02f)) continue;
+      const float strength = facing * leaving * light.area_m2 / (static_cast<float>(places * M_PI) * (distance * distance + 0.2f));
+      if (strength * static_cast<float>(places) < 2e-3f) continue;
+      if (tester && tester->blocked(lifted, direction, distance - 0.02f)) continue;
       sum += strength * light.radiance;
     }
   }
   float open = 1.f;
   if (tester) {
-    const Eigen::Vector3d side = normal.unitOrthogonal(), other = normal.cross(side);
+    const Eigen::Vector3f side = normal.unitOrthogonal(), other = normal.cross(side);
     int free = 0;
     for (int i = 0; i < kAmbientRays; ++i) {  // cosine-weighted spiral
-      const double r2 = (i + 0.5) / kAmbientRays, angle = 2.399963 * i;
-      const Eigen::Vector3d d = std::sqrt(r2) * (std::cos(angle) * side + std::sin(angle) * other) + std::sqrt(1 - r2) * normal;
-      free += !tester->blocked(lifted.cast<float>(), d.cast<float>(), kAmbientReach_m);
+      const float r2 = (static_cast<float>(i) + 0.5f) / kAmbientRays, angle = 2.399963f * static_cast<float>(i);
+      const Eigen::Vector3f d = std::sqrt(r2) * (std::cos(angle) * side + std::sin(angle) * other) + std::sqrt(1 - r2) * normal;
+      free += !tester->blocked(lifted, d, kAmbientReach_m);
     }
     open = static_cast<float>(free) / kAmbientRays;
   }
-  const float ambient = kBounce + kAmbient * open * (0.8f + 0.2f * static_cast<float>(normal.z()));
+  const float ambient = kBounce + kAmbient * open * (0.8f + 0.2f * normal.z());
   Colour4 out{};
   const float tint[3] = {0.97f, 1.0f, 1.02f};
-  for (int c = 0; c < 3; ++c) out[c] = std::sqrt(tint[c] * ambient + static_cast<float>(sum[c]));
+  for (int c = 0; c < 3; ++c) out[c] = std::sqrt(tint[c] * ambient + sum[c]);
   return out;
 }
 

@@ -37,7 +37,7 @@ class ShadowTester {
 /// occlusion).
 class LightModel {
  public:
-  LightModel(std::vector<AreaLight> lights) : lights_(std::move(lights)) {}
+  explicit LightModel(const std::vector<AreaLight>& lights);
 
   /// Display-gamma factor per channel for a surface. @param tester nullptr = nothing throws shadows.
   Colour4 at(const Eigen::Vector3d& position, const Eigen::Vector3d& normal, const ShadowTester* tester) const;
@@ -45,7 +45,11 @@ class LightModel {
   std::array<float, 6> cube(const Eigen::Vector3d& position) const;
 
  private:
-  std::vector<AreaLight> lights_;
+  struct Source {
+    Eigen::Vector3f centre, half_u, half_v, normal, radiance;
+    float area_m2;
+  };
+  std::vector<Source> sources_;
 };
 
 /// Fills the atlas and the vertices' brightness.

@@ -26,6 +26,7 @@ struct Triangle {
   std::uint16_t texture = 0;
   Lighting lighting = Lighting::kVertex;
   bool two_sided = false;
+  bool continues = false;  // the same plane, texture and light as the triangle before: no edge between them
 };
 
 /// Triangles that move (or stand) together and belong to one role.

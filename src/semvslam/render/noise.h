@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -36,7 +37,7 @@ inline float fractal_noise(float x, float y, std::uint32_t seed, int period, int
 
 /// Smooth step from 0 at `low` to 1 at `high`.
 inline float smooth_step(float low, float high, float x) {
-  const float t = std::fmin(std::fmax((x - low) / (high - low), 0.f), 1.f);
+  const float t = std::min(std::max((x - low) / (high - low), 0.f), 1.f);
   return t * t * (3.f - 2.f * t);
 }
 

@@ -66,7 +66,7 @@ void paint_landscape(cv::Mat& image, RandomStream& random) {
   cv::circle(image, {static_cast<int>(w * random.uniform(0.15, 0.85)), static_cast<int>(h * random.uniform(0.15, 0.4))},
              std::max(2, w / 12), scalar(hue_colour(0.12, 0.3, 1.0)), cv::FILLED, cv::LINE_AA);
   for (int layer = 0; layer < 5; ++layer) {
-    const auto seed = static_cast<std::uint32_t>(random.bits());
+    const auto seed = random.bits32();
     const double base = 0.38 + 0.13 * layer;
     const cv::Scalar colour = scalar(hue_colour(random.uniform(0.2, 0.6), 0.35 + 0.1 * layer, 0.75 - 0.13 * layer));
     std::vector<cv::Point> ridge{{0, h}};
@@ -123,7 +123,7 @@ cv::Mat paint_poster(cv::Size size, std::uint64_t seed) {
                 std::max(1, w / 120), cv::LINE_AA);
     write_block(image, {w / 12, h * 3 / 4, w * 10 / 12, h / 5}, std::max(7, h / 30), ink, random);
   }
-  add_grain(image, 0.2f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.2f, random.bits32());
   const int frame = std::max(2, w / 50);
   if (random.chance(0.7)) {
     cv::rectangle(image, {0, 0, w, h}, any_colour(random, 0.4, 0.05, 0.35), frame * 2);
@@ -155,7 +155,7 @@ cv::Mat paint_spines(cv::Size size, int count, std::uint64_t seed) {
     cv::rotate(spine, upright, cv::ROTATE_90_CLOCKWISE);
     upright.copyTo(image(cv::Rect(i * w, 0, w, h)));
   }
-  add_grain(image, 0.25f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.25f, random.bits32());
   return image;
 }
 
@@ -175,7 +175,7 @@ cv::Mat paint_screen(cv::Size size, std::uint64_t seed) {
     if (random.chance(0.3)) {  // a plot
       for (int k = 0; k < 3; ++k) {
         const cv::Scalar c = any_colour(random, 0.9, 0.5, 0.9);
-        const auto s = static_cast<std::uint32_t>(random.bits());
+        const auto s = random.bits32();
         cv::Point last;
         for (int x = 0; x < inner.width; x += 4) {
           const float n = fractal_noise(static_cast<float>(x) * 0.03f, 0.f, s, 4096, 4);
@@ -215,7 +215,7 @@ cv::Mat paint_page(cv::Size size, std::uint64_t seed) {
     cv::ellipse(image, {random.below(w), random.below(h)}, {w / 12 + random.below(w / 10), h / 30 + random.below(h / 20)},
                 random.uniform(-20, 20), 0, 330, pen, 2, cv::LINE_AA);
   }
-  add_grain(image, 0.1f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.1f, random.bits32());
   return image;
 }
 
@@ -253,7 +253,7 @@ cv::Mat paint_whiteboard(cv::Size size, std::uint64_t seed) {
     write_block(image, {at.x + 3, at.y, w / 14 - 6, w / 14}, 9, {60, 60, 60}, random);
     cv::circle(image, {at.x + w / 28, at.y + 3}, 5, any_colour(random, 1, 0.3, 0.9), cv::FILLED, cv::LINE_AA);
   }
-  add_grain(image, 0.06f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.06f, random.bits32());
   return image;
 }
 
@@ -261,7 +261,7 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
   RandomStream random(seed);
   cv::Mat image(size, CV_8UC3);
   const int w = size.width, h = size.height;
-  const auto s = static_cast<std::uint32_t>(random.bits());
+  const auto s = random.bits32();
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const float cloud = fractal_noise(static_cast<float>(x) * 0.008f, static_cast<float>(y) * 0.018f, s, 4096, 5);
@@ -302,7 +302,7 @@ cv::Mat paint_cardboard(cv::Size size, std::uint64_t seed) {
   for (int x = 0; x < w / 4 - 6; x += 3) {
     cv::rectangle(image, {w * 6 / 10 + 3 + x, h / 2 + 4, 1 + random.below(2), h / 8}, {30, 30, 30}, cv::FILLED);
   }
-  add_grain(image, 0.4f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.4f, random.bits32());
   return image;
 }
 
@@ -317,7 +317,7 @@ cv::Mat paint_leaf(cv::Size size, std::uint64_t seed) {
     cv::line(image, {w / 2, y}, {w, y - h / 5}, scalar(tone * 1.35f), 1, cv::LINE_AA);
   }
   cv::line(image, {w / 2, 0}, {w / 2, h}, scalar(tone * 1.6f), std::max(1, w / 24), cv::LINE_AA);
-  add_grain(image, 0.6f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.6f, random.bits32());
   return image;
 }
 
@@ -351,7 +351,7 @@ cv::Mat paint_label(cv::Size size, std::uint64_t seed) {
     cv::circle(image, {x + w / 4, h / 2}, h / 5, any_colour(random, 0.9, 0.3, 1.0), cv::FILLED, cv::LINE_AA);
     cv::putText(image, word(random), {x + w / 14, h * 9 / 16}, cv::FONT_HERSHEY_DUPLEX, w / 330.0, any_colour(random, 0.4, 0.0, 0.3), 2, cv::LINE_AA);
   }
-  add_grain(image, 0.15f, static_cast<std::uint32_t>(random.bits()));
+  add_grain(image, 0.15f, random.bits32());
   return image;
 }
 

@@ -111,11 +111,26 @@ void paint_mouth_and_nose(cv::Mat& face, const FaceFrame& f, const PersonLook& l
 }
 
 /// Folds as light and shade: slanted ridges of stretched noise.
-float fold_light(float x_m, float z_m, std::uint32_t seed) {
+float fold_at(float x_m, float z_m, std::uint32_t seed) {
   const float a = fractal_noise((x_m + 0.6f * z_m) * 14 + 40, (z_m - 0.25f * x_m) * 6 + 40, seed, 1024, 3);
   const float b = fractal_noise((x_m - 0.7f * z_m) * 12 + 40, (z_m + 0.3f * x_m) * 7 + 40, seed + 9, 1024, 3);
   const float ridge = std::abs(a - 0.5f) * 2 - 0.25f + 0.6f * (b - 0.5f);
   return 1.f + 0.34f * ridge;
+}
+
+/// fold_at over both halves of an image of clothes, computed at a quarter of the size. CV_32FC1.
+cv::Mat fold_light(cv::Size size, float top_m, float height_m, float stretch, std::uint32_t seed) {
+  cv::Mat small(size.height / 4, size.width / 4, CV_32FC1), out;
+  const int half = small.cols / 2;
+  for (int y = 0; y < small.rows; ++y) {
+    for (int x = 0; x < small.cols; ++x) {
+      const float x_m = ((static_cast<float>(x % half) + 0.5f) / static_cast<float>(half) - 0.5f) * 0.7f;
+      const float z_m = top_m - (static_cast<float>(y) + 0.5f) / static_cast<float>(small.rows) * height_m;
+      small.at<float>(y, x) = fold_at(x_m, z_m * stretch, seed + (x >= half));
+    }
+  }
+  cv::resize(small, out, size, 0, 0, cv::INTER_CUBIC);
+  return out;
 }
 
 cv::Vec3f cloth_tone(PersonLook::Cloth cloth, const cv::Vec3f& tone, const cv::Vec3f& second, float x_m, float z_m, float period_m) {
@@ -201,12 +216,13 @@ cv::Mat paint_top(cv::Size size, const PersonLook& look) {
   const auto seed = static_cast<std::uint32_t>(look.seed >> 3);
   const auto period = static_cast<float>(random.uniform(0.03, 0.09));
   const int half = size.width / 2;
+  const cv::Mat folds = fold_light(size, 1.55f, 0.7f, 1.f, seed);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float x_m = (static_cast<float>(x % half) / static_cast<float>(half) - 0.5f) * 0.7f;
       const float z_m = 1.55f - static_cast<float>(y) / static_cast<float>(size.height) * 0.7f;
       const float weave = 0.93f + 0.14f * value_noise(static_cast<float>(x) * 0.7f, static_cast<float>(y) * 0.7f, seed, 1024);
-      const cv::Vec3f c = cloth_tone(look.top, look.top_tone, look.top_second, x_m, z_m, period) * (weave * fold_light(x_m, z_m, seed + (x >= half)));
+      const cv::Vec3f c = cloth_tone(look.top, look.top_tone, look.top_second, x_m, z_m, period) * (weave * folds.at<float>(y, x));
       image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]), cv::saturate_cast<std::uint8_t>(c[2])};
     }
   }
@@ -234,11 +250,12 @@ cv::Mat paint_bottom(cv::Size size, const PersonLook& look) {
   const auto seed = static_cast<std::uint32_t>(look.seed >> 5);
   const int half = size.width / 2;
   const bool jeans = look.bottom == PersonLook::Cloth::kJeans;
+  const cv::Mat folds = fold_light(size, 1.05f, 1.05f, 1.3f, seed);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float x_m = (static_cast<float>(x % half) / static_cast<float>(half) - 0.5f) * 0.7f;
       const float z_m = 1.05f - static_cast<float>(y) / static_cast<float>(size.height) * 1.05f;
-      float light = fold_light(x_m, z_m * 1.3f, seed + (x >= half));
+      float light = folds.at<float>(y, x);
       cv::Vec3f c = cloth_tone(look.bottom, look.bottom_tone, look.bottom_tone * 1.5f, x_m, z_m, 0.07f);
       if (jeans) {
         const float twill = 0.88f + 0.24f * value_noise(static_cast<float>(x + y) * 0.5f, static_cast<float>(x - y) * 0.15f + 300, seed + 4, 1024);

@@ -4,12 +4,9 @@
 
 #include "semvslam/render/noise.h"
 #include "semvslam/render/paint.h"
-#include "semvslam/render/parallel.h"
 
 namespace semvslam::render {
 namespace {
-
-constexpr int kPaintThreads = 2;
 
 cv::Vec3b to_pixel(const cv::Vec3f& c) {
   cv::Vec3b out;
@@ -21,10 +18,10 @@ cv::Vec3b to_pixel(const cv::Vec3f& c) {
 template <typename Pixel>
 cv::Mat paint(cv::Size size, Pixel&& pixel) {
   cv::Mat image(size, CV_8UC3);
-  parallel_for(size.height, kPaintThreads, [&](int y, int) {
+  for (int y = 0; y < size.height; ++y) {
     auto* row = image.ptr<cv::Vec3b>(y);
     for (int x = 0; x < size.width; ++x) row[x] = to_pixel(pixel(x, y));
-  });
+  }
   return image;
 }
 
@@ -50,20 +47,20 @@ cv::Mat paint_wood(cv::Size size, const cv::Vec3f& tone, int boards, std::uint32
     const int piece = boards > 1 ? static_cast<int>(run / piece_px) : 0;
     const float along = boards > 1 ? run - static_cast<float>(piece) * piece_px : run;
     const std::uint32_t own = seed + static_cast<std::uint32_t>(board * 131 + piece * 7919);
-    const float warp = fractal_noise(along * 0.006f, across * 0.02f + 11.f, own, 4096, 3);
+    const float warp = fractal_noise(along * 0.006f, across * 0.02f + 11.f, own, 4096, 2);
     const float rings = across * 0.05f + warp * 7.f;
     const float grain = 0.5f + 0.5f * std::sin(rings * 6.2832f * 0.55f + 2.f * warp);
-    const float fibre = fractal_noise(along * 0.03f, across * 0.9f, own + 1, 4096, 3);
+    const float fibre = fractal_noise(along * 0.03f, across * 0.9f, own + 1, 4096, 2);
     const float pores = value_noise(along * 0.08f, across * 1.3f, own + 2, 4096) > 0.86f ? 0.82f : 1.f;
     float light = 0.78f + 0.30f * lattice_hash(board, piece, seed + 5) - 0.20f * grain * grain + 0.28f * (fibre - 0.5f);
     light *= pores;
-    const float knot = fractal_noise(along * 0.012f, across * 0.04f, own + 3, 4096, 2);
-    if (knot > 0.82f) light *= 1.f - 2.6f * (knot - 0.82f);
+    const float knot = value_noise(along * 0.016f, across * 0.055f, own + 3, 4096);
+    if (knot > 0.88f) light *= 1.f - 3.2f * (knot - 0.88f);
     if (boards > 1) {
       const float gap = std::min({across, board_px - across, along, piece_px - along});
       light *= 0.45f + 0.55f * smooth_step(0.f, 1.8f, gap);
     }
-    const float scratch = fractal_noise(static_cast<float>(x) * 0.01f, static_cast<float>(y) * 0.01f, seed + 9, 4096, 4);
+    const float scratch = fractal_noise(static_cast<float>(x) * 0.01f, static_cast<float>(y) * 0.01f, seed + 9, 4096, 2);
     light *= 0.9f + 0.2f * scratch;
     const float warm = lattice_hash(board, piece, seed + 6) - 0.5f;
     return {tone[0] * light * (1.f - 0.12f * warm), tone[1] * light, tone[2] * light * (1.f + 0.06f * warm)};
@@ -174,7 +171,7 @@ cv::Mat paint_rug(cv::Size size, std::uint64_t seed) {
     }
     cv::circle(image, at, std::max(1, static_cast<int>(r * 0.25)), tone(hue + 0.5, 0.4, 0.8), cv::FILLED, cv::LINE_AA);
   }
-  const auto noise_seed = static_cast<std::uint32_t>(random.bits());
+  const auto noise_seed = random.bits32();
   return paint(size, [&](int x, int y) -> cv::Vec3f {
     const float weave = fractal_noise(static_cast<float>(x) * 0.45f, static_cast<float>(y) * 0.45f, noise_seed, 4096, 2, 0.8f);
     const float worn = fractal_noise(static_cast<float>(x) * 0.012f, static_cast<float>(y) * 0.012f, noise_seed + 1, 4096, 4);
@@ -185,7 +182,7 @@ cv::Mat paint_rug(cv::Size size, std::uint64_t seed) {
 cv::Mat paint_wallpaper(cv::Size size, std::uint64_t seed) {
   RandomStream random(seed);
   const double hue = random.uniform();
-  const auto noise_seed = static_cast<std::uint32_t>(random.bits());
+  const auto noise_seed = random.bits32();
   const cv::Vec3f base = hue_colour(hue, 0.18, 0.80), stripe = hue_colour(std::fmod(hue + 0.05, 1.0), 0.30, 0.66);
   cv::Mat image = paint(size, [&](int x, int y) -> cv::Vec3f {
     const float phase = std::fmod(static_cast<float>(x), 120.f) / 120.f;

@@ -86,12 +86,9 @@ PersonLook random_look(std::uint64_t seed) {
   return look;
 }
 
-Person::Surface Person::make_surface(const std::vector<BodyPart>& parts, float coarseness, int threads) {
-  std::vector<Surface> pieces(parts.size());
-  parallel_for(static_cast<int>(parts.size()), threads, [&](int i, int) {
-    const BodyPart& part = parts[i];
+Person::Surface Person::make_piece(const std::vector<BodyPart>& parts, const BodyPart& part, float coarseness) {
     const ShapeMesh shape = polygonise(part.shape, part.cell_m * coarseness);
-    Surface& piece = pieces[i];
+    Surface piece;
     piece.vertices.reserve(shape.vertices.size());
     for (std::size_t v = 0; v < shape.vertices.size(); ++v) {
       const Eigen::Vector3d p = shape.vertices[v].cast<double>();
@@ -113,23 +110,24 @@ Person::Surface Person::make_surface(const std::vector<BodyPart>& parts, float c
       }
       piece.triangles.push_back(t);
     }
-  });
-  Surface all;
-  for (const Surface& piece : pieces) {
-    const auto base = static_cast<std::uint32_t>(all.vertices.size());
-    all.vertices.insert(all.vertices.end(), piece.vertices.begin(), piece.vertices.end());
-    for (Triangle t : piece.triangles) {
-      for (Corner& corner : t.corners) corner.vertex += base;
-      all.triangles.push_back(t);
-    }
+    return piece;
+}
+
+void Person::Surface::append(const Surface& piece) {
+  const auto base = static_cast<std::uint32_t>(vertices.size());
+  vertices.insert(vertices.end(), piece.vertices.begin(), piece.vertices.end());
+  for (Triangle t : piece.triangles) {
+    for (Corner& corner : t.corners) corner.vertex += base;
+    triangles.push_back(t);
   }
-  return all;
 }
 
 Person::Person(const PersonLook& look, SceneBuilder& builder, int threads) : look_(look) {
   const std::vector<BodyPart> parts = make_body_parts(look, builder);
-  fine_ = make_surface(parts, 1.f, threads);
-  coarse_ = make_surface(parts, kCoarse, threads);
+  const int count = static_cast<int>(parts.size());
+  std::vector<Surface> pieces(2 * count);
+  parallel_for(2 * count, threads, [&](int i, int) { pieces[i] = make_piece(parts, parts[i % count], i < count ? 1.f : kCoarse); });
+  for (int i = 0; i < 2 * count; ++i) (i < count ? fine_ : coarse_).append(pieces[i]);
 }
 
 void Person::pose(const std::array<BoneMotion, kBones>& motions, const SE3& world_from_person,

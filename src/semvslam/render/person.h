@@ -58,8 +58,9 @@ class Person {
   struct Surface {
     std::vector<Vertex> vertices;
     std::vector<Triangle> triangles;
+    void append(const Surface& piece);
   };
-  static Surface make_surface(const std::vector<BodyPart>& parts, float coarseness, int threads);
+  static Surface make_piece(const std::vector<BodyPart>& parts, const BodyPart& part, float coarseness);
 
   PersonLook look_;
   Surface fine_, coarse_;

@@ -29,6 +29,7 @@ class RandomStream {
  public:
   explicit RandomStream(std::uint64_t seed) : state_(mix64(seed)) {}
   std::uint64_t bits() { return mix64(state_ += 0x9E3779B97F4A7C15ull); }
+  std::uint32_t bits32() { return static_cast<std::uint32_t>(bits()); }
   /// Uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1.0p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }

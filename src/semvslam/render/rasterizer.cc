@@ -14,7 +14,7 @@ constexpr double kNear_m = 0.05;
 constexpr float kOffsetX[5] = {0.f, -0.125f, 0.375f, 0.125f, -0.375f};
 constexpr float kOffsetY[5] = {0.f, -0.375f, -0.125f, 0.375f, 0.125f};
 constexpr std::uint32_t kNothing = 0xffffffffu;
-constexpr int kMaxTaps = 6;  // of anisotropic filtering
+constexpr int kMaxTaps = 5;  // of anisotropic filtering
 
 struct ScreenPoint {
   double x, y;
@@ -128,11 +128,15 @@ void Rasterizer::set_up(const Mesh& mesh, const SE3& camera_from_world, std::vec
   std::vector<Eigen::Vector3d> points(mesh.vertices.size());
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = rotation * mesh.vertices[i] + translation;
   ScreenTriangle screen;
+  bool last_drawn = false;
   for (const Triangle& triangle : mesh.triangles) {
     const std::array<Eigen::Vector3d, 3> corners{points[triangle.corners[0].vertex], points[triangle.corners[1].vertex],
                                                  points[triangle.corners[2].vertex]};
-    if (!set_up_triangle(corners, triangle, screen)) continue;
+    const bool before = last_drawn;
+    last_drawn = set_up_triangle(corners, triangle, screen);
+    if (!last_drawn) continue;
     screen.role = mesh.role;
+    screen.continues = triangle.continues && before;
     out.push_back(screen);
   }
 }
@@ -178,7 +182,8 @@ void Rasterizer::fill_band(int band, BandBuffers& buffers) const {
   for (const std::uint32_t id : bins_[band]) {
     const ScreenTriangle& triangle = triangles_[id];
     const int first = std::max(triangle.first_row, top), last = std::min(triangle.last_row, bottom - 1);
-    for (int row = first; row <= last; ++row) fill_row(triangle, id, row, top, buffers);
+    const std::uint32_t surface = triangle.continues ? id - 1 : id;
+    for (int row = first; row <= last; ++row) fill_row(triangle, surface, row, top, buffers);
   }
 }
 
@@ -197,7 +202,7 @@ Colour4 Rasterizer::shade(const ScreenTriangle& t, float x, float y, const std::
   const float along_x = ux * ux + vx * vx, along_y = uy * uy + vy * vy;  // texels^2 per pixel
   const float major = std::max(along_x, along_y), minor = std::max(std::min(along_x, along_y), 1e-12f);
   const float ratio = std::sqrt(major / minor);
-  const int taps = std::clamp(static_cast<int>(ratio + 0.3f), 1, kMaxTaps);
+  const int taps = std::clamp(static_cast<int>(ratio + 0.15f), 1, kMaxTaps);
   // Half a level sharper than one texel per pixel: four colour points per edge, but the surface itself is sampled once.
   const float lod = 0.5f * std::log2(std::max(major, 1e-12f)) - std::log2(static_cast<float>(taps)) - 0.35f;
   Colour4 colour{};

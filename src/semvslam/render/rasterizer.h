@@ -56,6 +56,7 @@ class Rasterizer {
     std::uint16_t texture = 0;
     Lighting lighting = Lighting::kVertex;
     std::uint8_t role = 0;
+    bool continues = false;  // looks the same as the triangle before: pixels of both are shaded once
   };
   struct BandBuffers {
     std::array<std::vector<float>, kSamples> inverse_depth;

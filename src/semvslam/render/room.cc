@@ -12,21 +12,21 @@ struct Shell {
 };
 
 Shell paint_shell(SceneBuilder& builder, RandomStream& random) {
-  auto seed = [&] { return static_cast<std::uint32_t>(random.bits()); };
-  Shell s{builder, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-  s.plaster = builder.add_texture(paint_plaster({2048, 1024}, {196, 208, 214}, 0.8f, seed()));
-  s.bricks = builder.add_texture(paint_bricks({1024, 1024}, 28, seed()));
-  s.wallpaper = builder.add_texture(paint_wallpaper({2048, 1024}, random.bits()));
-  s.parquet = builder.add_texture(paint_wood({2048, 2048}, {86, 130, 180}, 52, seed()));
-  s.carpet = builder.add_texture(random.chance(0.5) ? paint_carpet({1024, 1024}, {120, 96, 84}, seed())
-                                                    : paint_tiles({1024, 1024}, 10, {176, 190, 200}, seed()));
-  s.ceiling = builder.add_texture(paint_tiles({1024, 1024}, 8, {222, 226, 228}, seed()));
-  s.skirting = builder.add_texture(paint_wood({512, 64}, {150, 170, 185}, 1, seed()));
-  s.frame = builder.add_texture(paint_material({256, 256}, {205, 212, 215}, 0.12f, seed()));
-  s.outdoors = builder.add_texture(paint_outdoors({1024, 512}, random.bits()), false);
-  s.rug = builder.add_texture(paint_rug({1024, 768}, random.bits()), false);
-  s.lamp = builder.add_texture(cv::Mat(8, 8, CV_8UC3, cv::Scalar(252, 254, 255)));
-  return s;
+  Shell shell{builder, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+  shell.plaster = builder.add_texture([s = random.bits32()] { return paint_plaster({2048, 1024}, {196, 208, 214}, 0.8f, s); });
+  shell.bricks = builder.add_texture([s = random.bits32()] { return paint_bricks({1024, 1024}, 28, s); });
+  shell.wallpaper = builder.add_texture([s = random.bits()] { return paint_wallpaper({2048, 1024}, s); });
+  shell.parquet = builder.add_texture([s = random.bits32()] { return paint_wood({2048, 2048}, {86, 130, 180}, 52, s); });
+  shell.carpet = builder.add_texture([soft = random.chance(0.5), s = random.bits32()] {
+    return soft ? paint_carpet({1024, 1024}, {120, 96, 84}, s) : paint_tiles({1024, 1024}, 10, {176, 190, 200}, s);
+  });
+  shell.ceiling = builder.add_texture([s = random.bits32()] { return paint_tiles({1024, 1024}, 8, {222, 226, 228}, s); });
+  shell.skirting = builder.add_texture([s = random.bits32()] { return paint_wood({512, 64}, {150, 170, 185}, 1, s); });
+  shell.frame = builder.add_texture([s = random.bits32()] { return paint_material({256, 256}, {205, 212, 215}, 0.12f, s); });
+  shell.outdoors = builder.add_texture([s = random.bits()] { return paint_outdoors({1024, 512}, s); }, false);
+  shell.rug = builder.add_texture([s = random.bits()] { return paint_rug({1024, 768}, s); }, false);
+  shell.lamp = builder.add_texture([] { return cv::Mat(8, 8, CV_8UC3, cv::Scalar(252, 254, 255)); });
+  return shell;
 }
 
 /// A piece of wall between two points of the plan, seen from the right of the way from `a` to `b`.
@@ -55,7 +55,7 @@ void window(Shell& s, const SE3& pose, double width_m, double height_m, std::vec
     s.builder.box(pose * on_plan(-width_m / 2 + (i + 0.5) * width_m / 12, -0.05, -0.72), {width_m / 12 - 0.012, 0.07, 0.55}, frame);
   }
   lights.push_back({pose * Eigen::Vector3d(0, -0.03, height_m / 2), r * Eigen::Vector3d(width_m / 2, 0, 0), {0, 0, height_m / 2},
-                    r * Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(2.6, 2.3, 2.0)});
+                    r * Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(3.4, 3.1, 2.8)});
 }
 
 void lamp(Shell& s, double x, double y, std::vector<AreaLight>& lights) {
@@ -63,7 +63,7 @@ void lamp(Shell& s, double x, double y, std::vector<AreaLight>& lights) {
   const Skin rim{s.frame, {0.5, 0.5}, {0, 0}, false};
   s.builder.box(on_plan(x, y, kRoomHeight_m - 0.05), {1.26, 0.36, 0.05}, rim);
   s.builder.quad({x - 0.6, y + 0.15, kRoomHeight_m - 0.052}, {1.2, 0, 0}, {0, -0.3, 0}, Skin{s.lamp, {0, 0}, {0, 0}, false}, 0.1, true);
-  lights.push_back({{x, y, kRoomHeight_m - 0.06}, {0.6, 0, 0}, {0, 0.15, 0}, {0, 0, -1}, Eigen::Vector3d(8.4, 9.4, 10.0)});
+  lights.push_back({{x, y, kRoomHeight_m - 0.06}, {0.6, 0, 0}, {0, 0.15, 0}, {0, 0, -1}, Eigen::Vector3d(11.4, 12.7, 13.5)});
 }
 
 void floors_and_ceilings(Shell& s) {

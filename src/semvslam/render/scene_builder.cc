@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "semvslam/render/parallel.h"
 
 namespace semvslam::render {
 namespace {
@@ -31,9 +34,9 @@ Triangle triangle_of(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uin
 
 }  // namespace
 
-std::uint16_t SceneBuilder::add_texture(const cv::Mat& bgr, bool repeat) {
-  scene_.textures.emplace_back(bgr, repeat);
-  return static_cast<std::uint16_t>(scene_.textures.size() - 1);
+std::uint16_t SceneBuilder::add_texture(std::function<cv::Mat()> paint, bool repeat) {
+  paintings_.push_back({std::move(paint), repeat});
+  return static_cast<std::uint16_t>(paintings_.size() - 1);
 }
 
 void SceneBuilder::begin_mesh() { scene_.meshes.emplace_back(); }
@@ -62,6 +65,7 @@ void SceneBuilder::quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& al
     Triangle t = triangle_of(base + corners[0], base + corners[1], base + corners[2], skin.texture);
     t.lighting = emissive ? Lighting::kEmissive : Lighting::kLightmap;
     for (int i = 0; i < 3; ++i) t.corners[i].uv = uv[corners[i]];
+    t.continues = &corners == &order[1];
     mesh().triangles.push_back(t);
   }
   if (emissive) return;
@@ -70,20 +74,22 @@ void SceneBuilder::quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& al
 }
 
 void SceneBuilder::box(const SE3& pose, const Eigen::Vector3d& size_m, const Skin& sides, const Skin& front,
-                       const Skin& top) {
+                       const Skin& top, bool closed) {
   const double x = size_m.x() / 2, y = size_m.y() / 2, z = size_m.z();
   const Eigen::Matrix3d r = pose.rotation_matrix();
-  const double step = std::clamp(size_m.maxCoeff() / 12, 0.03, 0.1);
+  const double longest = size_m.maxCoeff();
+  const double step = longest < 0.5 ? 0.5 : std::clamp(longest / 12, 0.06, 0.1);  // small things: light at the corners
   auto face = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v, const Skin& skin) {
     quad(pose * corner, r * u, r * v, skin, step);
   };
   const Eigen::Vector3d ex(2 * x, 0, 0), ey(0, 2 * y, 0), ez(0, 0, z);
   face({-x, -y, 0}, ex, ez, front);
   face({x, -y, 0}, ey, ez, sides);
-  face({x, y, 0}, -ex, ez, sides);
+  if (closed) face({x, y, 0}, -ex, ez, sides);
   face({-x, y, 0}, -ey, ez, sides);
   face({-x, -y, z}, ex, ey, top);
-  if ((pose * Eigen::Vector3d::Zero()).z() > 0.02) face({-x, y, 0}, ex, -ey, sides);  // nobody sees what stands on the floor
+  const bool on_floor = (pose * Eigen::Vector3d::Zero()).z() < 0.02;
+  if (closed && !on_floor) face({-x, y, 0}, ex, -ey, sides);
 }
 
 std::vector<Eigen::Vector3d>& SceneBuilder::normals_for_new_vertices() {
@@ -195,7 +201,10 @@ void SceneBuilder::leaf(const Eigen::Vector3d& root, const Eigen::Vector3d& dire
   }
 }
 
-StaticScene SceneBuilder::finish() {
+StaticScene SceneBuilder::finish(int threads) {
+  std::vector<std::optional<Texture>> painted(paintings_.size());
+  parallel_for(static_cast<int>(painted.size()), threads, [&](int i, int) { painted[i].emplace(paintings_[i].paint(), paintings_[i].repeat); });
+  for (auto& texture : painted) scene_.textures.push_back(std::move(*texture));
   std::vector<std::size_t> order(scene_.patches.size());  // by height: little waste on shelves
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   std::stable_sort(order.begin(), order.end(),

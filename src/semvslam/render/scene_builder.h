@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -48,7 +49,8 @@ struct StaticScene {
 /// Puts surfaces together. All sizes in metres; `pose` arguments are world_from_part.
 class SceneBuilder {
  public:
-  std::uint16_t add_texture(const cv::Mat& bgr, bool repeat = true);
+  /// @param paint makes the image, CV_8UC3; called by finish(), perhaps by another thread.
+  std::uint16_t add_texture(std::function<cv::Mat()> paint, bool repeat = true);
 
   /// Surfaces added from here on belong to a new mesh (which is culled as a whole).
   void begin_mesh();
@@ -60,7 +62,9 @@ class SceneBuilder {
   void quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& along_u, const Eigen::Vector3d& along_v, const Skin& skin,
             double light_step_m = 0.1, bool emissive = false);
   /// A box centred on pose's origin in x and y, standing on it in z. `front` is the face towards -y, `top` towards +z.
-  void box(const SE3& pose, const Eigen::Vector3d& size_m, const Skin& sides, const Skin& front, const Skin& top);
+  /// @param closed false leaves out the faces towards +y and -z, for things whose back nobody can see.
+  void box(const SE3& pose, const Eigen::Vector3d& size_m, const Skin& sides, const Skin& front, const Skin& top,
+           bool closed = true);
   void box(const SE3& pose, const Eigen::Vector3d& size_m, const Skin& skin) { box(pose, size_m, skin, skin, skin); }
   /// A solid of revolution around pose's z axis. @param profile (radius, height) from bottom to top.
   void lathe(const SE3& pose, const std::vector<Eigen::Vector2d>& profile, int segments, const Skin& skin);
@@ -70,8 +74,9 @@ class SceneBuilder {
   void leaf(const Eigen::Vector3d& root, const Eigen::Vector3d& direction, double length_m, double width_m, double droop,
             const Skin& skin);
 
-  /// Packs the light atlas (all texels 1) and hands everything over.
-  StaticScene finish();
+  /// Paints the textures, packs the light atlas (all texels 1) and hands everything over. The result does not depend on
+  /// `threads`.
+  StaticScene finish(int threads);
 
  private:
   Mesh& mesh() { return scene_.meshes.back(); }
@@ -82,6 +87,11 @@ class SceneBuilder {
     std::size_t mesh, first_triangle, patch;
   };
   std::vector<PendingPatch> pending_;
+  struct Painting {
+    std::function<cv::Mat()> paint;
+    bool repeat;
+  };
+  std::vector<Painting> paintings_;
 };
 
 }  // namespace semvslam::render

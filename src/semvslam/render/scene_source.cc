@@ -64,7 +64,7 @@ struct RenderedScene::Impl {
     SceneBuilder builder;
     const Room room = build_room(builder, options.seed);
     cast = std::make_unique<Cast>(options.people, options.seed, room.seats, builder, options.threads);
-    scene = builder.finish();
+    scene = builder.finish(options.threads);
     cast->take_items(scene);
     light = std::make_unique<LightModel>(room.lights);
     bake_light(scene, *light, options.threads);

@@ -11,6 +11,7 @@ namespace semvslam::render {
 namespace {
 
 constexpr std::size_t kTableSize = 1u << 16;
+constexpr int kWaveSide = 256;
 constexpr int kRowsPerTask = 32;
 constexpr float kMinRange_m = 0.45f, kMaxRange_m = 8.0f;
 constexpr float kDisparityStep_px = 0.125f;
@@ -25,6 +26,11 @@ constexpr float kReadNoise = 1.1f;
 SensorModel::SensorModel(const Camera& camera) : camera_(camera), normal_table_(kTableSize) {
   RandomStream random(90210);
   for (float& value : normal_table_) value = static_cast<float>(random.normal());
+  wave_table_.resize(kWaveSide * kWaveSide);
+  for (int i = 0; i < kWaveSide * kWaveSide; ++i) {
+    const auto x = static_cast<float>(i % kWaveSide), y = static_cast<float>(i / kWaveSide);
+    wave_table_[i] = 2.f * value_noise(x * 0.25f, y * 0.25f, 4711, kWaveSide / 4) - 1.f;
+  }
   vignette_.resize(static_cast<std::size_t>(camera.width_px) * camera.height_px);
   const double cx = (camera.width_px - 1) / 2.0, cy = (camera.height_px - 1) / 2.0, reach = cx * cx + cy * cy + 1e-9;
   for (int y = 0; y < camera.height_px; ++y) {
@@ -41,6 +47,7 @@ cv::Mat SensorModel::measure_depth(const Picture& picture, std::uint64_t frame_s
   const float focal_baseline = static_cast<float>(camera_.fx_px * camera_.baseline_m);
   const float units = static_cast<float>(camera_.depth_units_per_m);
   const auto seed = static_cast<std::uint32_t>(mix64(frame_seed, 1));
+  const int shift_x = static_cast<int>(seed & 0xff), shift_y = static_cast<int>(seed >> 8 & 0xff);
   const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
   parallel_for(tasks, threads, [&](int task, int) {
     std::vector<std::uint8_t> shadow(width);
@@ -58,10 +65,11 @@ cv::Mat SensorModel::measure_depth(const Picture& picture, std::uint64_t frame_s
         if (depth[x] > 0) leftmost = std::min(leftmost, seen);
       }
       const std::size_t start = mix64(frame_seed, y) % kTableSize;
+      const float* waves = wave_table_.data() + ((y + shift_y) & (kWaveSide - 1)) * kWaveSide;
       for (int x = 0; x < width; ++x) {
         auto normal = [&](std::size_t k) { return normal_table_[(start + 3 * static_cast<std::size_t>(x) + k) & (kTableSize - 1)]; };
-        const int sx = std::clamp(x + static_cast<int>(std::lround(kLateralNoise_px * normal(0))), 0, width - 1);
-        const int sy = std::clamp(y + static_cast<int>(std::lround(kLateralNoise_px * normal(1))), 0, height - 1);
+        const int sx = std::clamp(x + static_cast<int>(std::floor(kLateralNoise_px * normal(0) + 0.5f)), 0, width - 1);
+        const int sy = std::clamp(y + static_cast<int>(std::floor(kLateralNoise_px * normal(1) + 0.5f)), 0, height - 1);
         const float z = picture.depth_m.at<float>(sy, sx);
         row[x] = 0;
         if (shadow[x] || z < kMinRange_m || z > kMaxRange_m) continue;
@@ -75,9 +83,9 @@ cv::Mat SensorModel::measure_depth(const Picture& picture, std::uint64_t frame_s
         } else if (normal(2) < -2.9f) {
           continue;
         }
-        const float wave = 2.f * value_noise(static_cast<float>(x) * 0.28f, static_cast<float>(y) * 0.28f, seed + 9, 4096) - 1.f;
+        const float wave = waves[(x + shift_x) & (kWaveSide - 1)];
         const float disparity = focal_baseline / z + kDisparityNoise_px * (1.7f * wave + 0.5f * normal(2));
-        const float rounded = kDisparityStep_px * std::round(disparity / kDisparityStep_px);
+        const float rounded = kDisparityStep_px * std::floor(disparity / kDisparityStep_px + 0.5f);
         if (rounded <= 0.f) continue;
         const float value = focal_baseline / rounded * units + 0.5f;
         row[x] = value < 65535.f ? static_cast<std::uint16_t>(value) : 0;

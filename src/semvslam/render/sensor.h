@@ -27,6 +27,7 @@ class SensorModel {
  private:
   Camera camera_;
   std::vector<float> normal_table_;   // standard normal deviates, a power of two of them
+  std::vector<float> wave_table_;     // smooth noise in [-1, 1], repeats
   std::vector<float> vignette_;       // per pixel factor
 };
 

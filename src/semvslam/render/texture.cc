@@ -10,11 +10,19 @@ namespace semvslam::render {
 namespace {
 
 using Byte4 = std::uint8_t __attribute__((vector_size(4)));
+using Byte8 = std::uint8_t __attribute__((vector_size(8)));
+using Float8 = float __attribute__((vector_size(32)));
 
 inline Colour4 unpack(std::uint32_t texel) {
   Byte4 bytes;
   std::memcpy(&bytes, &texel, 4);
   return __builtin_convertvector(bytes, Colour4);
+}
+
+inline Float8 unpack_pair(const std::uint32_t* texels) {
+  Byte8 bytes;
+  std::memcpy(&bytes, texels, 8);
+  return __builtin_convertvector(bytes, Float8);
 }
 
 int power_of_two(int n) { return static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(n, 1)))); }
@@ -28,12 +36,12 @@ Texture::Texture(const cv::Mat& bgr, bool repeat) : repeat_(repeat) {
   if (size != bgr.size()) cv::resize(bgr, image, size, 0, 0, cv::INTER_LINEAR);
   while (true) {
     Level level{image.cols, image.rows, {}};
-    level.texels.resize(static_cast<std::size_t>(image.cols) * image.rows);
-    for (int y = 0; y < image.rows; ++y) {
-      const auto* row = image.ptr<cv::Vec3b>(y);
-      for (int x = 0; x < image.cols; ++x) {
-        level.texels[static_cast<std::size_t>(y) * image.cols + x] =
-            row[x][0] | row[x][1] << 8 | static_cast<std::uint32_t>(row[x][2]) << 16;
+    level.texels.reserve(static_cast<std::size_t>(image.cols + 1) * (image.rows + 1));
+    for (int y = 0; y <= image.rows; ++y) {
+      const auto* row = image.ptr<cv::Vec3b>(y < image.rows ? y : repeat ? 0 : image.rows - 1);
+      for (int x = 0; x <= image.cols; ++x) {
+        const cv::Vec3b& c = row[x < image.cols ? x : repeat ? 0 : image.cols - 1];
+        level.texels.push_back(c[0] | c[1] << 8 | static_cast<std::uint32_t>(c[2]) << 16);
       }
     }
     levels_.push_back(std::move(level));
@@ -45,26 +53,20 @@ Texture::Texture(const cv::Mat& bgr, bool repeat) : repeat_(repeat) {
 }
 
 inline Colour4 Texture::bilinear(const Level& level, float u, float v) const {
-  const float x = u * static_cast<float>(level.width) - 0.5f, y = v * static_cast<float>(level.height) - 0.5f;
-  const float fx = std::floor(x), fy = std::floor(y);
-  int x0 = static_cast<int>(fx), y0 = static_cast<int>(fy), x1 = x0 + 1, y1 = y0 + 1;
-  if (repeat_) {
-    x0 &= level.width - 1;
-    x1 &= level.width - 1;
-    y0 &= level.height - 1;
-    y1 &= level.height - 1;
-  } else {
-    x0 = std::clamp(x0, 0, level.width - 1);
-    x1 = std::clamp(x1, 0, level.width - 1);
-    y0 = std::clamp(y0, 0, level.height - 1);
-    y1 = std::clamp(y1, 0, level.height - 1);
+  float x = u * static_cast<float>(level.width) - 0.5f, y = v * static_cast<float>(level.height) - 0.5f;
+  if (!repeat_) {
+    x = std::min(std::max(x, 0.f), static_cast<float>(level.width - 1));
+    y = std::min(std::max(y, 0.f), static_cast<float>(level.height - 1));
   }
+  const float fx = std::floor(x), fy = std::floor(y);
+  const int x0 = static_cast<int>(fx) & (level.width - 1), y0 = static_cast<int>(fy) & (level.height - 1);
   const float ax = x - fx, ay = y - fy;
-  const std::uint32_t* upper = level.texels.data() + static_cast<std::size_t>(y0) * level.width;
-  const std::uint32_t* lower = level.texels.data() + static_cast<std::size_t>(y1) * level.width;
-  const Colour4 top = unpack(upper[x0]) * (1.f - ax) + unpack(upper[x1]) * ax;
-  const Colour4 bottom = unpack(lower[x0]) * (1.f - ax) + unpack(lower[x1]) * ax;
-  return top * (1.f - ay) + bottom * ay;
+  const int stride = level.width + 1;
+  const std::uint32_t* upper = level.texels.data() + static_cast<std::size_t>(y0) * stride + x0;
+  const Float8 columns = unpack_pair(upper) * (1.f - ay) + unpack_pair(upper + stride) * ay;
+  const Colour4 left = __builtin_shufflevector(columns, columns, 0, 1, 2, 3);
+  const Colour4 right = __builtin_shufflevector(columns, columns, 4, 5, 6, 7);
+  return left * (1.f - ax) + right * ax;
 }
 
 Colour4 Texture::sample(float u, float v, float lod) const {

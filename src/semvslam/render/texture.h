@@ -25,7 +25,9 @@ class Texture {
  private:
   struct Level {
     int width, height;
-    std::vector<std::uint32_t> texels;  // B | G << 8 | R << 16
+    // B | G << 8 | R << 16; one column and one row more than the image, so that a texel's right and lower neighbours always
+    // follow it (wrapped or repeated).
+    std::vector<std::uint32_t> texels;
   };
   Colour4 bilinear(const Level& level, float u, float v) const;
 
