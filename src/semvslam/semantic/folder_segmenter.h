@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+
+#include "semvslam/semantic/segmenter.h"
+
+namespace semvslam {
+
+/// Masks made elsewhere: a folder of single-channel PNG files, one per image. Pixel value 0 = nothing, n = object n of
+/// that image. `roles.json` in the folder or beside it names the class of each number: a list of
+/// {"number": 1, "label": "person"}; without it every number is a person.
+class FolderSegmenter final : public Segmenter {
+ public:
+  /// Errors: no such folder, no PNG file in it, a roles.json that is damaged.
+  static Result<std::unique_ptr<Segmenter>> open(const std::filesystem::path& folder, const RoleTable& roles);
+
+  /// The mask with the request's name, else with the nearest stamp within 20 ms. No mask = no instances. Errors: a
+  /// damaged file, another size than the image's.
+  Result<Segmentation> segment(const SegmentationRequest& request) override;
+  const std::vector<std::string>& class_names() const override { return names_; }
+  std::string description() const override;
+
+ private:
+  FolderSegmenter() = default;
+  const std::filesystem::path* find(const SegmentationRequest& request) const;
+
+  std::filesystem::path folder_;
+  std::map<std::string, std::filesystem::path> by_name_;           // file name without extension
+  std::map<TimeStamp, std::filesystem::path> by_stamp_;            // where the name is a number of seconds
+  std::map<int, int> class_of_number_;                             // into names_
+  std::vector<std::string> names_;
+  RoleTable roles_;
+};
+
+}  // namespace semvslam

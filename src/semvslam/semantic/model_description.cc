@@ -1,0 +1,73 @@
+#include "semvslam/semantic/model_description.h"
+
+#include <fmt/core.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace semvslam {
+namespace {
+
+constexpr int kFormat = 1;
+
+template <typename T, std::size_t N>
+std::array<T, N> array_of(const nlohmann::json& j, const char* key) {
+  const auto v = j.at(key).get<std::vector<T>>();
+  if (v.size() != N) throw std::invalid_argument(fmt::format("'{}' has {} values, not {}", key, v.size(), N));
+  std::array<T, N> out{};
+  std::copy(v.begin(), v.end(), out.begin());
+  return out;
+}
+
+void check(bool condition, const char* what) {
+  if (!condition) throw std::invalid_argument(what);
+}
+
+void fill(ModelDescription& m, const nlohmann::json& j) {
+  check(j.at("format").get<int>() == kFormat, "'format' is not 1: exported by another version of training/export.py");
+  m.name = j.at("name").get<std::string>();
+  m.trunk = j.at("trunk").get<std::string>();
+  m.box = j.at("box").get<std::string>();
+  m.mask = j.at("mask").get<std::string>();
+  m.input = {j.at("input").at("width").get<int>(), j.at("input").at("height").get<int>()};
+  m.pad = j.at("input").at("pad").get<int>();
+  m.classes = j.at("classes").get<std::vector<std::string>>();
+  m.strides = array_of<int, ModelDescription::kLevels>(j, "strides");
+  m.anchor_sizes = array_of<std::vector<float>, ModelDescription::kLevels>(j, "anchor_sizes");
+  m.anchor_ratios = j.at("anchor_ratios").get<std::vector<float>>();
+  m.box_weights = array_of<float, 4>(j, "box_weights");
+  m.box_levels = j.at("box_levels").get<std::vector<float>>();
+  m.mask_levels = j.at("mask_levels").get<std::vector<float>>();
+  m.channels = j.at("feature_channels").get<int>();
+  check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096, "'input' is no usable size");
+  check(!m.classes.empty(), "'classes' is empty");
+  check(m.channels > 0 && m.channels <= 4096, "'feature_channels' is out of range");
+  check(!m.anchor_ratios.empty() && !m.anchor_sizes[0].empty(), "no anchors");
+  for (const auto& sizes : m.anchor_sizes) check(sizes.size() == m.anchor_sizes[0].size(), "'anchor_sizes' differ in length");
+  for (const float r : m.anchor_ratios) check(r > 0, "'anchor_ratios' must be positive");
+  for (const float w : m.box_weights) check(w > 0, "'box_weights' must be positive");
+  for (const int s : m.strides) check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
+  check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels, "too many level thresholds");
+}
+
+}  // namespace
+
+Result<ModelDescription> ModelDescription::read(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "model.json";
+  std::ifstream stream(file);
+  if (!stream)
+    return Error{ErrorCode::kNotFound, fmt::format("{}: cannot be opened; a model is a folder with this file and the "
+                                                   "network's graphs (training/export.py writes it)", file.string())};
+  ModelDescription m;
+  try {
+    fill(m, nlohmann::json::parse(stream));
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file.string(), e.what())};
+  }
+  for (const std::string& name : {m.trunk, m.box, m.mask})
+    if (!std::filesystem::is_regular_file(folder / name))
+      return Error{ErrorCode::kNotFound, fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};
+  return m;
+}
+
+}  // namespace semvslam

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "semvslam/base/result.h"
+
+namespace semvslam {
+
+/// What model.json says of an exported network; training/README.md explains every number.
+struct ModelDescription {
+  static constexpr int kLevels = 3;
+
+  std::string name, trunk, box, mask;  // files beside model.json
+  cv::Size input;
+  int pad = 127;                       // value of the pixels that the image does not cover
+  std::vector<std::string> classes;
+  std::array<int, kLevels> strides{};
+  std::array<std::vector<float>, kLevels> anchor_sizes;
+  std::vector<float> anchor_ratios;
+  std::array<float, 4> box_weights{};
+  std::vector<float> box_levels, mask_levels;
+  int channels = 0;
+
+  int anchors_per_cell() const { return static_cast<int>(anchor_sizes[0].size() * anchor_ratios.size()); }
+
+  /// Reads folder/model.json. Errors: missing, no JSON, a key missing or out of range, a file that it names missing.
+  static Result<ModelDescription> read(const std::filesystem::path& folder);
+};
+
+}  // namespace semvslam

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <span>
+#include <string>
+
+#include "semvslam/base/result.h"
+#include "semvslam/semantic/model_description.h"
+#include "semvslam/semantic/roi_align.h"
+
+namespace semvslam {
+
+/// One pyramid level as the trunk gives it; memory of the graphs, valid until the next call of trunk().
+struct TrunkLevel {
+  FeatureMap features;
+  std::span<const float> objectness;  // one per anchor
+  std::span<const float> deltas;      // four per anchor
+};
+using TrunkOutput = std::array<TrunkLevel, ModelDescription::kLevels>;
+
+/// What the box head says of some regions; memory of the graphs, valid until its next call.
+struct BoxHeadOutput {
+  std::span<const float> probabilities;  // 1 + classes per region, the first is background
+  std::span<const float> deltas;         // four per region
+};
+
+/// The three parts of a network as some inference library runs them. Not safe for concurrent use.
+class NetworkGraphs {
+ public:
+  static constexpr int kBoxBatch = 50, kBoxCells = 7;  // regions of one call of the box head; cells along an edge
+  static constexpr int kMaskBatch = 4, kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
+
+  virtual ~NetworkGraphs() = default;
+  /// @param image CV_8UC3 BGR of the model's input size.
+  virtual Result<TrunkOutput> trunk(const cv::Mat& image) = 0;
+  /// Where the features of kBoxBatch regions are to be written before box_head().
+  virtual std::span<float> box_input() = 0;
+  virtual Result<BoxHeadOutput> box_head() = 0;
+  /// The same for kMaskBatch regions. @return kMaskChannels x kMaskSide x kMaskSide probabilities per region.
+  virtual std::span<float> mask_input() = 0;
+  virtual Result<std::span<const float>> mask_head() = 0;
+  virtual std::string description() const = 0;
+};
+
+/// Errors: a graph that cannot be read, or whose inputs and outputs differ from the description (the message names the
+/// tensor), or a build without OpenVINO (kUnsupported).
+/// @param precision "auto" (the fastest type of the machine) or "f32".
+Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder, const ModelDescription& model,
+                                                            const std::string& precision, int threads);
+/// The same by OpenCV's DNN module: slower, reads ONNX graphs only.
+Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder, const ModelDescription& model);
+bool have_openvino();
+
+}  // namespace semvslam

@@ -1,0 +1,156 @@
+#include "semvslam/semantic/network_segmenter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "semvslam/semantic/image_input.h"
+#include "semvslam/semantic/mask_paste.h"
+
+namespace semvslam {
+namespace {
+
+constexpr float kLeastProposalSide = 4, kLeastObjectSide = 2;  // px of the network's input
+
+bool finite(std::span<const float> values) {
+  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+}
+
+Error not_finite(const char* what) {
+  return {ErrorCode::kInternal, std::string("the network gives numbers that are not finite in its ") + what};
+}
+
+}  // namespace
+
+NetworkSegmenter::NetworkSegmenter(std::unique_ptr<NetworkGraphs> graphs, ModelDescription model, Limits limits, RoleTable roles,
+                                   StageTimers* timers)
+    : graphs_(std::move(graphs)), model_(std::move(model)), limits_(limits), roles_(std::move(roles)),
+      timers_(timers ? *timers : own_timers_) {
+  for (std::size_t l = 0; l < anchors_.size(); ++l)
+    anchors_[l] = make_anchors(model_.input.height / model_.strides[l], model_.input.width / model_.strides[l], model_.strides[l],
+                               model_.anchor_sizes[l], model_.anchor_ratios);
+}
+
+Result<Segmentation> NetworkSegmenter::segment(const SegmentationRequest& request) {
+  Result<cv::Mat> bgr = to_bgr8(request.image);
+  if (!bgr) return bgr.error();
+  Segmentation out{request.frame, request.stamp, bgr->size(), {}};
+  FittedImage fitted;
+  {
+    const auto lap = timers_["segment.prepare"].time();
+    fitted = fit_image(*bgr, model_.input, model_.pad, input_);
+  }
+  Result<TrunkOutput> trunk = [&] {
+    const auto lap = timers_["segment.trunk"].time();
+    return graphs_->trunk(fitted.image);
+  }();
+  if (!trunk) return trunk.error();
+  const Result<std::vector<DetectionBox>> proposals = propose(*trunk);
+  if (!proposals) return proposals.error();
+  const Result<std::vector<Object>> objects = classify(*trunk, *proposals);
+  if (!objects) return objects.error();
+  if (const Status s = draw(*trunk, *objects, fitted.scale_x, fitted.scale_y, out); !s) return s.error();
+  return out;
+}
+
+Result<std::vector<DetectionBox>> NetworkSegmenter::propose(const TrunkOutput& trunk) const {
+  const auto lap = timers_["segment.proposals"].time();
+  std::vector<DetectionBox> boxes;
+  std::vector<float> scores;
+  for (std::size_t l = 0; l < trunk.size(); ++l) {
+    if (!finite(trunk[l].objectness)) return not_finite("objectness");
+    for (const int i : largest(trunk[l].objectness, limits_.proposals_per_level)) {
+      const float* deltas = &trunk[l].deltas[static_cast<std::size_t>(i) * 4];
+      if (!finite({deltas, 4})) return not_finite("proposals");
+      const DetectionBox box = decode_box(deltas, anchors_[l][i], {1, 1, 1, 1}, static_cast<float>(model_.input.width),
+                                          static_cast<float>(model_.input.height));
+      if (box.width() < kLeastProposalSide || box.height() < kLeastProposalSide) continue;
+      boxes.push_back(box);
+      scores.push_back(trunk[l].objectness[i]);
+    }
+  }
+  std::vector<DetectionBox> out;
+  for (const int i : suppress_overlaps(boxes, scores, limits_.proposal_overlap, NetworkGraphs::kBoxBatch)) out.push_back(boxes[i]);
+  return out;
+}
+
+void NetworkSegmenter::align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,
+                                    float* to) const {
+  roi_align(trunk[roi_level(box, levels)].features, model_.channels, box, cells, to);
+}
+
+Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const TrunkOutput& trunk,
+                                                                         const std::vector<DetectionBox>& proposals) {
+  const auto lap = timers_["segment.boxes"].time();
+  std::vector<Object> found;
+  if (proposals.empty()) return found;
+  const std::span<float> input = graphs_->box_input();
+  const std::size_t region = input.size() / NetworkGraphs::kBoxBatch;
+  for (std::size_t n = 0; n < proposals.size(); ++n)
+    align_region(trunk, proposals[n], model_.box_levels, NetworkGraphs::kBoxCells, &input[n * region]);
+  std::fill(input.begin() + static_cast<std::ptrdiff_t>(proposals.size() * region), input.end(), 0.f);
+  const Result<BoxHeadOutput> head = graphs_->box_head();
+  if (!head) return head.error();
+  const std::size_t classes = model_.classes.size();
+  const auto used_p = head->probabilities.first(proposals.size() * (classes + 1)), used_d = head->deltas.first(proposals.size() * 4);
+  if (!finite(used_p) || !finite(used_d)) return not_finite("classes or boxes");
+
+  std::vector<std::vector<Object>> by_class(classes);
+  for (std::size_t n = 0; n < proposals.size(); ++n) {
+    const DetectionBox box = decode_box(&used_d[n * 4], proposals[n], model_.box_weights, static_cast<float>(model_.input.width),
+                                        static_cast<float>(model_.input.height));
+    if (box.width() < kLeastObjectSide || box.height() < kLeastObjectSide) continue;
+    for (std::size_t c = 0; c < classes; ++c)
+      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= limits_.score) by_class[c].push_back({box, static_cast<int>(c), p});
+  }
+  for (const std::vector<Object>& candidates : by_class) {
+    std::vector<DetectionBox> boxes;
+    std::vector<float> scores;
+    for (const Object& o : candidates) {
+      boxes.push_back(o.box);
+      scores.push_back(o.score);
+    }
+    for (const int i : suppress_overlaps(boxes, scores, limits_.object_overlap, limits_.objects)) found.push_back(candidates[i]);
+  }
+  std::stable_sort(found.begin(), found.end(), [](const Object& a, const Object& b) { return a.score > b.score; });
+  if (std::ssize(found) > limits_.objects) found.resize(static_cast<std::size_t>(limits_.objects));
+  return found;
+}
+
+Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y, Segmentation& out) {
+  const auto lap = timers_["segment.masks"].time();
+  const auto width = static_cast<float>(out.size.width), height = static_cast<float>(out.size.height);
+  const std::span<float> input = graphs_->mask_input();
+  const std::size_t region = input.size() / NetworkGraphs::kMaskBatch;
+  constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
+  for (std::size_t first = 0; first < objects.size(); first += NetworkGraphs::kMaskBatch) {
+    const std::size_t n = std::min<std::size_t>(NetworkGraphs::kMaskBatch, objects.size() - first);
+    for (std::size_t k = 0; k < n; ++k)
+      align_region(trunk, objects[first + k].box, model_.mask_levels, NetworkGraphs::kMaskCells, &input[k * region]);
+    std::fill(input.begin() + static_cast<std::ptrdiff_t>(n * region), input.end(), 0.f);
+    const Result<std::span<const float>> masks = graphs_->mask_head();
+    if (!masks) return masks.error();
+    for (std::size_t k = 0; k < n; ++k) {
+      const Object& o = objects[first + k];
+      const std::size_t channel = o.class_index == 0 ? 0 : 1;  // persons have a channel of their own
+      const std::span<const float> mask = masks->subspan((k * NetworkGraphs::kMaskChannels + channel) * kPixels, kPixels);
+      if (!finite(mask)) return not_finite("masks");
+      const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
+                             std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
+      PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size);
+      if (pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
+      Instance i;
+      i.id = InstanceId(static_cast<std::uint32_t>(out.instances.size()));
+      i.class_index = o.class_index;
+      i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
+      i.role = roles_.role(i.class_name);
+      i.score = o.score;
+      i.box = {box.x0, box.y0, box.width(), box.height()};
+      i.window = pasted.window;
+      i.mask = pasted.mask;
+      out.instances.push_back(std::move(i));
+    }
+  }
+  return Status::success();
+}
+
+}  // namespace semvslam

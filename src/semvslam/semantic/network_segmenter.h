@@ -1,0 +1,51 @@
+#pragma once
+
+#include <memory>
+
+#include "semvslam/semantic/network_graphs.h"
+#include "semvslam/semantic/segmenter.h"
+
+namespace semvslam {
+
+/// Mask R-CNN: the graphs run in an inference library; anchors, proposals, regions and pasting are here
+/// (training/README.md, "After the graphs").
+class NetworkSegmenter final : public Segmenter {
+ public:
+  struct Limits {
+    int proposals_per_level = 300;
+    float proposal_overlap = 0.7f;  // IoU above which the weaker of two proposals goes
+    float object_overlap = 0.5f;    // the same of objects of one class
+    int objects = 50;
+    float score = 0.5f;             // least score of an object
+  };
+
+  /// @param timers may be null; gets segment.prepare, .trunk, .proposals, .boxes, .masks. Must outlive this object.
+  NetworkSegmenter(std::unique_ptr<NetworkGraphs> graphs, ModelDescription model, Limits limits, RoleTable roles,
+                   StageTimers* timers);
+
+  Result<Segmentation> segment(const SegmentationRequest& request) override;
+  const std::vector<std::string>& class_names() const override { return model_.classes; }
+  std::string description() const override { return graphs_->description(); }
+
+ private:
+  struct Object {
+    DetectionBox box;  // px of the network's input
+    int class_index = 0;
+    float score = 0;
+  };
+  Result<std::vector<DetectionBox>> propose(const TrunkOutput& trunk) const;
+  Result<std::vector<Object>> classify(const TrunkOutput& trunk, const std::vector<DetectionBox>& proposals);
+  Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y, Segmentation& out);
+  void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells, float* to) const;
+
+  std::unique_ptr<NetworkGraphs> graphs_;
+  const ModelDescription model_;
+  const Limits limits_;
+  const RoleTable roles_;
+  StageTimers own_timers_;
+  StageTimers& timers_;
+  std::array<std::vector<DetectionBox>, ModelDescription::kLevels> anchors_;
+  cv::Mat input_;
+};
+
+}  // namespace semvslam

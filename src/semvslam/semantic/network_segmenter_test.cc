@@ -1,0 +1,216 @@
+#include "semvslam/semantic/network_segmenter.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+namespace semvslam {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+const fs::path kModels = fs::path(SEMVSLAM_SOURCE_DIR) / "models";
+
+SegmentationRequest request(cv::Mat image) { return {FrameId(0), TimeStamp{}, std::move(image), ""}; }
+
+/// Graphs without a network: features, scores and boxes are what a test sets.
+class FakeGraphs final : public NetworkGraphs {
+ public:
+  explicit FakeGraphs(const ModelDescription& model) : classes_(model.classes.size()) {
+    for (std::size_t l = 0; l < level_.size(); ++l) {
+      const int rows = model.input.height / model.strides[l], columns = model.input.width / model.strides[l];
+      const auto cells = static_cast<std::size_t>(rows) * columns;
+      level_[l].features.assign(cells * model.channels, 0.f);
+      level_[l].objectness.assign(cells * model.anchors_per_cell(), -5.f);
+      level_[l].deltas.assign(cells * model.anchors_per_cell() * 4, 0.f);
+      out_[l] = {{level_[l].features.data(), rows, columns, model.strides[l]}, level_[l].objectness, level_[l].deltas};
+    }
+    box_in_.resize(static_cast<std::size_t>(kBoxBatch) * kBoxCells * kBoxCells * model.channels);
+    mask_in_.resize(static_cast<std::size_t>(kMaskBatch) * kMaskCells * kMaskCells * model.channels);
+    probabilities_.assign(kBoxBatch * (classes_ + 1), 0.f);
+    deltas_.assign(kBoxBatch * 4, 0.f);
+    masks_.assign(static_cast<std::size_t>(kMaskBatch) * kMaskChannels * kMaskSide * kMaskSide, 1.f);
+  }
+  Result<TrunkOutput> trunk(const cv::Mat&) override { return out_; }
+  std::span<float> box_input() override { return box_in_; }
+  Result<BoxHeadOutput> box_head() override { return BoxHeadOutput{probabilities_, deltas_}; }
+  std::span<float> mask_input() override { return mask_in_; }
+  Result<std::span<const float>> mask_head() override { return std::span<const float>(masks_); }
+  std::string description() const override { return "fake"; }
+
+  struct Level {
+    std::vector<float> features, objectness, deltas;
+  };
+  std::array<Level, 3> level_;
+  std::vector<float> probabilities_, deltas_, masks_;
+
+ private:
+  std::size_t classes_;
+  TrunkOutput out_;
+  std::vector<float> box_in_, mask_in_;
+};
+
+ModelDescription small_model() {
+  ModelDescription m;
+  m.name = "test";
+  m.input = {128, 96};
+  m.classes = {"person", "cup"};
+  m.strides = {8, 16, 32};
+  m.anchor_sizes = {std::vector<float>{16}, {32}, {64}};
+  m.anchor_ratios = {1};
+  m.box_weights = {10, 10, 5, 5};
+  m.box_levels = {28, 84};
+  m.mask_levels = {56};
+  m.channels = 4;
+  return m;
+}
+
+struct Fake {
+  Fake() {
+    auto owned = std::make_unique<FakeGraphs>(small_model());
+    graphs = owned.get();
+    segmenter = std::make_unique<NetworkSegmenter>(std::move(owned), small_model(), NetworkSegmenter::Limits{}, RoleTable(), nullptr);
+  }
+  FakeGraphs* graphs;
+  std::unique_ptr<NetworkSegmenter> segmenter;
+};
+
+TEST(NetworkSegmenter, AnAnchorThatIsSureBecomesAnInstanceInImagePixels) {
+  Fake f;
+  f.graphs->level_[2].objectness[5] = 9.f;  // cell (1, 1) of 3 x 4: a 64 px square around (48, 48)
+  f.graphs->probabilities_[1] = 0.8f;
+  const Result<Segmentation> s = f.segmenter->segment(request(cv::Mat(192, 256, CV_8UC3, cv::Scalar::all(0))));
+  ASSERT_TRUE(s) << s.error().message;
+  ASSERT_EQ(s->instances.size(), 1u);
+  const Instance& i = s->instances[0];
+  EXPECT_EQ(i.class_name, "person");
+  EXPECT_EQ(i.role, Role::kDynamic);
+  EXPECT_FLOAT_EQ(i.score, 0.8f);
+  EXPECT_EQ(i.box, cv::Rect2f(32, 32, 128, 128));
+  EXPECT_EQ(i.window, cv::Rect(32, 32, 128, 128));
+}
+
+TEST(NetworkSegmenter, NumbersThatAreNotFiniteAreAnError) {
+  const cv::Mat image(96, 128, CV_8UC3, cv::Scalar::all(0));
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Fake a, b, c;
+  a.graphs->level_[0].objectness[3] = nan;
+  b.graphs->level_[1].objectness[3] = 9;
+  b.graphs->probabilities_[2] = nan;
+  c.graphs->level_[1].objectness[3] = 9;
+  c.graphs->probabilities_[1] = 0.9f;
+  c.graphs->masks_[0] = nan;
+  for (Fake* f : {&a, &b, &c}) {
+    const Result<Segmentation> s = f->segmenter->segment(request(image));
+    ASSERT_FALSE(s);
+    EXPECT_THAT(s.error().message, HasSubstr("not finite"));
+  }
+}
+
+TEST(NetworkSegmenter, NothingSureMeansNoInstance) {
+  Fake f;
+  const Result<Segmentation> s = f.segmenter->segment(request(cv::Mat(96, 128, CV_8UC3, cv::Scalar::all(0))));
+  ASSERT_TRUE(s);
+  EXPECT_TRUE(s->instances.empty());
+  EXPECT_FALSE(f.segmenter->segment(request(cv::Mat())));
+}
+
+TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
+  const auto absent = ModelDescription::read("/nonexistent");
+  ASSERT_FALSE(absent);
+  EXPECT_THAT(absent.error().message, HasSubstr("model.json"));
+  const fs::path folder = fs::temp_directory_path() / ("model_" + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  for (const char* text : {"", "{", "[]", "{\"format\": 2}", "{\"format\": 1, \"name\": 5}"}) {
+    std::ofstream(folder / "model.json") << text;
+    const auto damaged = ModelDescription::read(folder);
+    ASSERT_FALSE(damaged) << text;
+    EXPECT_THAT(damaged.error().message, HasSubstr("model.json"));
+  }
+  fs::remove_all(folder);
+}
+
+/// The shipped network; these need OpenVINO.
+class ShippedNetwork : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!have_openvino()) GTEST_SKIP() << "built without OpenVINO";
+  }
+  static Result<std::unique_ptr<Segmenter>> make(int threads = 1, double score = 0.05) {
+    SegmenterOptions options;
+    options.model = kModels.string();
+    options.backend = "openvino";
+    options.precision = "f32";
+    options.threads = threads;
+    options.score = score;
+    return make_segmenter(options, RoleTable());
+  }
+};
+
+TEST_F(ShippedNetwork, FindsWhatTheReferenceFinds) {
+  auto segmenter = make();
+  ASSERT_TRUE(segmenter) << segmenter.error().message;
+  std::ifstream file(kModels / "golden" / "golden.json");
+  const nlohmann::json wanted = nlohmann::json::parse(file).at("detections");
+  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  ASSERT_FALSE(picture.empty());
+  const Result<Segmentation> s = (*segmenter)->segment(request(picture));
+  ASSERT_TRUE(s) << s.error().message;
+  // Weak objects may swap places or cross the threshold by rounding; sure ones must agree.
+  for (const nlohmann::json& w : wanted) {
+    if (w.at("score").get<float>() < 0.3f) continue;
+    const auto same = [&](const Instance& i) {
+      return i.class_name == w.at("class").get<std::string>() && std::abs(i.score - w.at("score").get<float>()) < 0.02f &&
+             std::abs(i.box.x - w.at("box")[0].get<float>()) < 2 && std::abs(i.box.br().y - w.at("box")[3].get<float>()) < 2 &&
+             std::abs(cv::countNonZero(i.mask) - w.at("mask_pixels").get<int>()) < 0.02 * w.at("mask_pixels").get<int>() + 20;
+    };
+    EXPECT_TRUE(std::any_of(s->instances.begin(), s->instances.end(), same)) << w.dump();
+  }
+}
+
+TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
+  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  auto one = make(1), two = make(2);
+  ASSERT_TRUE(one && two);
+  const auto a = (*one)->segment(request(picture)), b = (*two)->segment(request(picture));
+  ASSERT_TRUE(a && b);
+  ASSERT_EQ(a->instances.size(), b->instances.size());
+  for (std::size_t i = 0; i < a->instances.size(); ++i) {
+    EXPECT_EQ(a->instances[i].score, b->instances[i].score);
+    EXPECT_EQ(a->instances[i].window, b->instances[i].window);
+    EXPECT_EQ(cv::norm(a->instances[i].mask, b->instances[i].mask, cv::NORM_INF), 0);
+  }
+}
+
+TEST_F(ShippedNetwork, OddImagesGiveAResultOrAnError) {
+  auto segmenter = make(2, 0.5);
+  ASSERT_TRUE(segmenter);
+  for (const cv::Mat& image : {cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)), cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)),
+                               cv::Mat(48, 64, CV_16UC1, cv::Scalar(9000)), cv::Mat(33, 17, CV_8UC4, cv::Scalar::all(50)),
+                               cv::Mat(1, 3000, CV_8UC3, cv::Scalar::all(0)), cv::Mat(3648, 5472, CV_8UC3, cv::Scalar::all(30))}) {
+    const auto s = (*segmenter)->segment(request(image));
+    ASSERT_TRUE(s) << s.error().message;
+    EXPECT_EQ(s->size, image.size());
+  }
+}
+
+TEST_F(ShippedNetwork, AWrongGraphIsNamed) {
+  Result<ModelDescription> model = ModelDescription::read(kModels);
+  ASSERT_TRUE(model);
+  ModelDescription swapped = *model;
+  std::swap(swapped.box, swapped.mask);
+  auto graphs = make_openvino_graphs(kModels, swapped, "f32", 1);
+  ASSERT_FALSE(graphs);
+  EXPECT_THAT(graphs.error().message, HasSubstr("'rois'"));
+  ModelDescription fewer = *model;
+  fewer.classes.pop_back();
+  graphs = make_openvino_graphs(kModels, fewer, "f32", 1);
+  ASSERT_FALSE(graphs);
+  EXPECT_THAT(graphs.error().message, HasSubstr("'probabilities'"));
+}
+
+}  // namespace
+}  // namespace semvslam

@@ -1,0 +1,103 @@
+#include <fmt/core.h>
+
+#include <opencv2/dnn.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "semvslam/semantic/network_graphs.h"
+
+namespace semvslam {
+namespace {
+
+class OpenCvGraphs final : public NetworkGraphs {
+ public:
+  OpenCvGraphs(const std::filesystem::path& folder, const ModelDescription& model)
+      : model_(model), trunk_(read(folder / model.trunk)), box_(read(folder / model.box)), mask_(read(folder / model.mask)) {
+    const int box_shape[] = {kBoxBatch, kBoxCells, kBoxCells, model.channels};
+    const int mask_shape[] = {kMaskBatch, kMaskCells, kMaskCells, model.channels};
+    box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
+    mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
+  }
+
+  Result<TrunkOutput> trunk(const cv::Mat& image) override {
+    return guarded<TrunkOutput>([&] {
+      trunk_.setInput(cv::dnn::blobFromImage(image, 1.0 / 127.5, cv::Size(), cv::Scalar::all(127.5), true));
+      std::vector<cv::String> names;
+      for (const char* kind : {"p", "objectness", "deltas"})
+        for (int l = 3; l < 3 + ModelDescription::kLevels; ++l) names.push_back(fmt::format("{}{}", kind, l));
+      outputs_.clear();
+      trunk_.forward(outputs_, names);
+      TrunkOutput out;
+      for (std::size_t l = 0; l < out.size(); ++l) {
+        const int stride = model_.strides[l], rows = model_.input.height / stride, columns = model_.input.width / stride;
+        const std::size_t cells = static_cast<std::size_t>(rows) * columns, anchors = cells * model_.anchors_per_cell();
+        out[l].features = {numbers(outputs_[l], cells * model_.channels, names[l]).data(), rows, columns, stride};
+        out[l].objectness = numbers(outputs_[l + 3], anchors, names[l + 3]);
+        out[l].deltas = numbers(outputs_[l + 6], anchors * 4, names[l + 6]);
+      }
+      return out;
+    });
+  }
+
+  std::span<float> box_input() override { return {box_in_.ptr<float>(), box_in_.total()}; }
+  std::span<float> mask_input() override { return {mask_in_.ptr<float>(), mask_in_.total()}; }
+
+  Result<BoxHeadOutput> box_head() override {
+    return guarded<BoxHeadOutput>([&] {
+      box_.setInput(box_in_);
+      const std::vector<cv::String> names{"probabilities", "deltas"};
+      box_out_.clear();
+      box_.forward(box_out_, names);
+      return BoxHeadOutput{numbers(box_out_[0], kBoxBatch * (model_.classes.size() + 1), names[0]), numbers(box_out_[1], kBoxBatch * 4, names[1])};
+    });
+  }
+
+  Result<std::span<const float>> mask_head() override {
+    return guarded<std::span<const float>>([&] {
+      mask_.setInput(mask_in_);
+      mask_out_ = mask_.forward("masks");
+      return numbers(mask_out_, static_cast<std::size_t>(kMaskBatch) * kMaskChannels * kMaskSide * kMaskSide, "masks");
+    });
+  }
+
+  std::string description() const override { return fmt::format("{} by OpenCV {}", model_.name, CV_VERSION); }
+
+ private:
+  static cv::dnn::Net read(const std::filesystem::path& file) {
+    if (file.extension() != ".onnx") throw std::runtime_error(fmt::format("{}: OpenCV reads .onnx graphs only", file.string()));
+    cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
+    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+    return net;
+  }
+
+  static std::span<const float> numbers(const cv::Mat& m, std::size_t wanted, const std::string& name) {
+    if (m.type() != CV_32F || m.total() != wanted || !m.isContinuous())
+      throw std::runtime_error(fmt::format("output '{}' has {} numbers, expected {}", name, m.total(), wanted));
+    return {m.ptr<float>(), m.total()};
+  }
+
+  template <typename T, typename Action>
+  static Result<T> guarded(Action action) {
+    try {
+      return action();
+    } catch (const std::exception& e) {
+      return Error{ErrorCode::kInternal, fmt::format("OpenCV DNN: {}", e.what())};
+    }
+  }
+
+  ModelDescription model_;
+  cv::dnn::Net trunk_, box_, mask_;
+  cv::Mat box_in_, mask_in_, mask_out_;
+  std::vector<cv::Mat> outputs_, box_out_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder, const ModelDescription& model) {
+  try {
+    return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenCvGraphs>(folder, model));
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInvalidInput, fmt::format("OpenCV DNN: {}", e.what())};
+  }
+}
+
+}  // namespace semvslam

@@ -1,0 +1,191 @@
+// The only file that knows OpenVINO.
+#include "semvslam/semantic/network_graphs.h"
+
+#ifdef SEMVSLAM_HAVE_OPENVINO
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <openvino/openvino.hpp>
+
+namespace semvslam {
+namespace {
+
+using Shape = std::vector<std::size_t>;
+
+/// Says which tensor is wrong; thrown and caught in this file only, as OpenVINO's own exceptions are.
+struct WrongTensor : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+std::size_t count(const Shape& shape) {
+  std::size_t n = 1;
+  for (const std::size_t s : shape) n *= s;
+  return n;
+}
+
+class OpenVinoGraphs final : public NetworkGraphs {
+ public:
+  OpenVinoGraphs(const std::filesystem::path& folder, const ModelDescription& model, const std::string& precision, int threads)
+      : model_(model) {
+    ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(threads), ov::hint::enable_cpu_pinning(false)};
+    if (precision == "f32") options.insert(ov::hint::inference_precision(ov::element::f32));
+    load_trunk(folder / model.trunk, options);
+    // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
+    options[ov::inference_num_threads.name()] = 1;
+    const auto c = static_cast<std::size_t>(model.channels);
+    box_ = load_head(folder / model.box, {kBoxBatch, kBoxCells, kBoxCells, c}, options);
+    probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
+    box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
+    mask_ = load_head(folder / model.mask, {kMaskBatch, kMaskCells, kMaskCells, c}, options);
+    masks_ = output(mask_, model.mask, "masks", {kMaskBatch, kMaskChannels, kMaskSide, kMaskSide});
+  }
+
+  Result<TrunkOutput> trunk(const cv::Mat& image) override {
+    if (image.type() != CV_8UC3 || image.size() != model_.input || !image.isContinuous())
+      return Error{ErrorCode::kInternal, "the trunk got an image of a wrong size or type"};
+    if (Status s = run([&] {
+          trunk_.set_input_tensor(ov::Tensor(ov::element::u8, {1, static_cast<std::size_t>(image.rows), static_cast<std::size_t>(image.cols), 3}, image.data));
+          trunk_.infer();
+        }); !s)
+      return s.error();
+    return levels_;
+  }
+
+  std::span<float> box_input() override { return input(box_); }
+  std::span<float> mask_input() override { return input(mask_); }
+
+  Result<BoxHeadOutput> box_head() override {
+    if (Status s = run([&] { box_.infer(); }); !s) return s.error();
+    return BoxHeadOutput{probabilities_, box_deltas_};
+  }
+
+  Result<std::span<const float>> mask_head() override {
+    if (Status s = run([&] { mask_.infer(); }); !s) return s.error();
+    return masks_;
+  }
+
+  std::string description() const override {
+    return fmt::format("{} by OpenVINO {}", model_.name, ov::get_openvino_version().buildNumber);
+  }
+
+ private:
+  template <typename Action>
+  static Status run(Action action) {
+    try {
+      action();
+    } catch (const std::exception& e) {
+      return Error{ErrorCode::kInternal, fmt::format("OpenVINO: {}", e.what())};
+    }
+    return Status::success();
+  }
+
+  static ov::Core& core() {
+    static ov::Core shared;  // its plugins stay loaded
+    return shared;
+  }
+
+  static std::shared_ptr<ov::Model> read(const std::filesystem::path& file) { return core().read_model(file.string()); }
+
+  static ov::CompiledModel compile(const std::shared_ptr<ov::Model>& m, const ov::AnyMap& options) {
+    return core().compile_model(m, "CPU", options);
+  }
+
+  static void check_input(const std::shared_ptr<ov::Model>& m, const std::string& name, const Shape& wanted) {
+    if (m->inputs().size() != 1 || m->input().get_names().count(name) == 0)
+      throw WrongTensor(fmt::format("expected one input, named '{}'", name));
+    const ov::PartialShape shape = m->input().get_partial_shape();
+    if (!shape.compatible(ov::PartialShape(ov::Shape(wanted))))
+      throw WrongTensor(fmt::format("input '{}' has the shape {}, expected [{}]", name, shape.to_string(), fmt::join(wanted, ",")));
+  }
+
+  void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
+    try {
+      const std::shared_ptr<ov::Model> m = read(file);
+      const auto h = static_cast<std::size_t>(model_.input.height), w = static_cast<std::size_t>(model_.input.width);
+      check_input(m, "image", {1, 3, h, w});
+      ov::preprocess::PrePostProcessor p(m);
+      p.input().tensor().set_element_type(ov::element::u8).set_layout("NHWC").set_color_format(ov::preprocess::ColorFormat::BGR);
+      p.input().preprocess().convert_element_type(ov::element::f32).convert_color(ov::preprocess::ColorFormat::RGB).mean(127.5f).scale(127.5f);
+      p.input().model().set_layout("NCHW");
+      trunk_ = compile(p.build(), options).create_infer_request();
+    } catch (const std::exception& e) {
+      throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
+    }
+    const auto a = static_cast<std::size_t>(model_.anchors_per_cell());
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      const int stride = model_.strides[l], rows = model_.input.height / stride, columns = model_.input.width / stride;
+      const auto r = static_cast<std::size_t>(rows), c = static_cast<std::size_t>(columns);
+      const auto part = [&](const char* name, std::size_t channels) {
+        return output(trunk_, model_.trunk, fmt::format("{}{}", name, l + 3), {1, r, c, channels});
+      };
+      levels_[l].features = {part("p", static_cast<std::size_t>(model_.channels)).data(), rows, columns, stride};
+      levels_[l].objectness = part("objectness", a);
+      levels_[l].deltas = part("deltas", a * 4);
+    }
+  }
+
+  static ov::InferRequest load_head(const std::filesystem::path& file, const Shape& shape, const ov::AnyMap& options) {
+    try {
+      const std::shared_ptr<ov::Model> m = read(file);
+      check_input(m, "rois", shape);
+      m->reshape(ov::PartialShape(ov::Shape(shape)));
+      return compile(m, options).create_infer_request();
+    } catch (const std::exception& e) {
+      throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
+    }
+  }
+
+  static std::span<float> input(ov::InferRequest& request) {
+    ov::Tensor t = request.get_input_tensor();
+    return {t.data<float>(), t.get_size()};
+  }
+
+  /// Output memory does not move between calls: shapes are fixed.
+  static std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name, const Shape& wanted) {
+    ov::Tensor t;
+    try {
+      t = request.get_tensor(name);
+    } catch (const std::exception&) {
+      throw WrongTensor(fmt::format("{}: there is no output '{}'", file, name));
+    }
+    if (t.get_element_type() != ov::element::f32 || t.get_shape() != ov::Shape(wanted))
+      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected f32 [{}]", file, name, t.get_element_type().to_string(),
+                                    t.get_shape().to_string(), fmt::join(wanted, ",")));
+    return {t.data<float>(), count(wanted)};
+  }
+
+  ModelDescription model_;
+  ov::InferRequest trunk_, box_, mask_;
+  TrunkOutput levels_;
+  std::span<const float> probabilities_, box_deltas_, masks_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder, const ModelDescription& model,
+                                                            const std::string& precision, int threads) {
+  try {
+    return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenVinoGraphs>(folder, model, precision, threads));
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInvalidInput, e.what()};
+  }
+}
+
+bool have_openvino() { return true; }
+
+}  // namespace semvslam
+
+#else
+
+namespace semvslam {
+
+Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path&, const ModelDescription&,
+                                                            const std::string&, int) {
+  return Error{ErrorCode::kUnsupported, "this build has no OpenVINO: `pip install openvino`, then configure again"};
+}
+
+bool have_openvino() { return false; }
+
+}  // namespace semvslam
+
+#endif

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "semvslam/base/config_schema.h"
+#include "semvslam/base/result.h"
+#include "semvslam/base/stage_timer.h"
+#include "semvslam/semantic/roles.h"
+#include "semvslam/semantic/segmentation.h"
+
+namespace semvslam {
+
+/// An image to segment and where it comes from: sources that look masks up need the stamp, networks only the pixels.
+struct SegmentationRequest {
+  FrameId frame;
+  TimeStamp stamp;
+  cv::Mat image;      // CV_8UC3 BGR, CV_8UC4 BGRA or CV_8UC1; 16-bit images are scaled down
+  std::string name;   // file name without folder, where there is one
+};
+
+/// Finds the objects of an image. One call at a time per object: not safe for concurrent use; make one per thread.
+class Segmenter {
+ public:
+  virtual ~Segmenter() = default;
+  Segmenter() = default;
+  Segmenter(const Segmenter&) = delete;
+  Segmenter& operator=(const Segmenter&) = delete;
+
+  /// Errors: an empty image, a type that is none, a network that gives no finite numbers, a mask file that is damaged.
+  /// An image without any object is a Segmentation without instances.
+  virtual Result<Segmentation> segment(const SegmentationRequest& request) = 0;
+  virtual const std::vector<std::string>& class_names() const = 0;
+  /// One line for logs.
+  virtual std::string description() const = 0;
+};
+
+struct SegmenterOptions {
+  std::string source = "network";  // network, folder, none
+  std::string model = "models";    // folder of the network's model.json
+  std::string backend = "auto";    // auto, openvino, opencv
+  std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere
+  std::string mask_folder;         // of source `folder`
+  double score = 0.5;              // least score of an instance
+  int threads = 2;                 // of the network
+
+  void add_to(ConfigSchema& schema);
+};
+
+/// Errors: model or folder missing or damaged, a backend that this build lacks.
+Result<std::unique_ptr<Segmenter>> make_segmenter(const SegmenterOptions& options, const RoleTable& roles,
+                                                  StageTimers* timers = nullptr);
+
+}  // namespace semvslam
