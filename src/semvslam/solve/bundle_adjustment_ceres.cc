@@ -124,7 +124,7 @@ std::vector<Active> inliers_of(const BaProblem& problem, const BaOptions& option
   for (std::size_t i = 0; i < active.size(); ++i) {
     const auto& e = problem.edges[i];
     const PointObservation& o = e.observation;
-    if (!is_usable(o) || !problem.points[e.point].allFinite()) continue;
+    if (!is_usable(o) || !is_usable(problem.points[e.point])) continue;
     const DenseResidual r = dense_residual(problem.camera, problem.poses[e.pose], problem.points[e.point], o);
     if (!r.valid) continue;
     active[i].pixel = o.inverse_variance_px * r.value.head<2>().squaredNorm() <= options.chi2_pixel;

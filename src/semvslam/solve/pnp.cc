@@ -151,7 +151,7 @@ Result<PnpEstimate> estimate_pose(const Intrinsics& camera, std::span<const Eige
     throw std::invalid_argument("estimate_pose: points and observations differ in number");
   AbsolutePoseProblem problem{camera, {}, {}, {}};
   for (std::size_t i = 0; i < observations.size(); ++i) {
-    if (!points_in_world[i].allFinite() || !is_usable(observations[i])) continue;
+    if (!is_usable(points_in_world[i]) || !is_usable(observations[i])) continue;
     const Eigen::Vector2d& pixel = observations[i].pixel;
     problem.points.push_back(points_in_world[i]);
     problem.observations.push_back(observations[i]);

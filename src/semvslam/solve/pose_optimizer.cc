@@ -67,7 +67,7 @@ int PoseProblem::load(std::span<const Eigen::Vector3d> points, std::span<const P
   int usable = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const PointObservation& o = observations[i];
-    if (!points[i].allFinite() || !is_usable(o)) continue;
+    if (!is_usable(points[i]) || !is_usable(o)) continue;
     Block& b = blocks_[i / kLanes];
     const std::size_t lane = i % kLanes;
     b.x[lane] = points[i].x();

@@ -3,6 +3,11 @@
 #include <cmath>
 
 namespace semvslam {
+namespace {
+
+constexpr double kLargest = 1e9;
+
+}  // namespace
 
 Eigen::Matrix<double, 6, 6> unpack_pose_normal(const double* h) {
   Eigen::Matrix<double, 6, 6> m;
@@ -34,12 +39,15 @@ DenseResidual dense_residual(const Intrinsics& camera, const SE3& camera_from_wo
 }
 
 bool is_usable(const PointObservation& o) {
-  return o.pixel.allFinite() && std::isfinite(o.inverse_variance_px) && o.inverse_variance_px > 0;
+  return o.pixel.allFinite() && o.pixel.cwiseAbs().maxCoeff() <= kLargest && o.inverse_variance_px > 0 &&
+         o.inverse_variance_px <= kLargest;
 }
 
+bool is_usable(const Eigen::Vector3d& point) { return point.allFinite() && point.cwiseAbs().maxCoeff() <= kLargest; }
+
 bool has_depth(const PointObservation& o) {
-  return std::isfinite(o.disparity_px) && o.disparity_px > 0 && std::isfinite(o.inverse_variance_disparity) &&
-         o.inverse_variance_disparity > 0;
+  return o.disparity_px > 0 && o.disparity_px <= kLargest && o.inverse_variance_disparity > 0 &&
+         o.inverse_variance_disparity <= kLargest;
 }
 
 bool is_usable(const Intrinsics& c) {

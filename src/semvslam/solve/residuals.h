@@ -69,38 +69,49 @@ inline PointInformation<T> point_information(const ResidualTerms<T>& r, const T&
 inline constexpr int kPoseEntries = 21;
 
 template <typename T>
-inline void add_pose_normal(const PointInformation<T>& m, const T& x, const T& y, const T& z, T* h, T* g) {
+inline void pose_normal(const PointInformation<T>& m, const T& x, const T& y, const T& z, T* h, T* g) {
   // Rows of A = -M [p]x, the upper right block: row_i(A) = p x row_i(M).
   const T a00 = y * m.xz, a01 = z * m.xx - x * m.xz, a02 = -(y * m.xx);
   const T a10 = y * m.yz - z * m.yy, a11 = -(x * m.yz), a12 = x * m.yy;
   const T a20 = y * m.zz - z * m.yz, a21 = z * m.xz - x * m.zz, a22 = x * m.yz - y * m.xz;
-  h[0] += m.xx;
-  h[2] += m.xz;
-  h[3] += a00;
-  h[4] += a01;
-  h[5] += a02;
-  h[6] += m.yy;
-  h[7] += m.yz;
-  h[8] += a10;
-  h[9] += a11;
-  h[10] += a12;
-  h[11] += m.zz;
-  h[12] += a20;
-  h[13] += a21;
-  h[14] += a22;
+  h[0] = m.xx;
+  h[1] = T{};
+  h[2] = m.xz;
+  h[3] = a00;
+  h[4] = a01;
+  h[5] = a02;
+  h[6] = m.yy;
+  h[7] = m.yz;
+  h[8] = a10;
+  h[9] = a11;
+  h[10] = a12;
+  h[11] = m.zz;
+  h[12] = a20;
+  h[13] = a21;
+  h[14] = a22;
   // B = [p]x A, the lower right block.
-  h[15] += y * a20 - z * a10;
-  h[16] += y * a21 - z * a11;
-  h[17] += y * a22 - z * a12;
-  h[18] += z * a01 - x * a21;
-  h[19] += z * a02 - x * a22;
-  h[20] += x * a12 - y * a02;
-  g[0] += m.gx;
-  g[1] += m.gy;
-  g[2] += m.gz;
-  g[3] += y * m.gz - z * m.gy;
-  g[4] += z * m.gx - x * m.gz;
-  g[5] += x * m.gy - y * m.gx;
+  h[15] = y * a20 - z * a10;
+  h[16] = y * a21 - z * a11;
+  h[17] = y * a22 - z * a12;
+  h[18] = z * a01 - x * a21;
+  h[19] = z * a02 - x * a22;
+  h[20] = x * a12 - y * a02;
+  g[0] = m.gx;
+  g[1] = m.gy;
+  g[2] = m.gz;
+  g[3] = y * m.gz - z * m.gy;
+  g[4] = z * m.gx - x * m.gz;
+  g[5] = x * m.gy - y * m.gx;
+}
+
+/// Adds what pose_normal() gives.
+template <typename T>
+inline void add_pose_normal(const PointInformation<T>& m, const T& x, const T& y, const T& z, T* h, T* g) {
+  T one_h[kPoseEntries], one_g[6];
+  pose_normal(m, x, y, z, one_h, one_g);
+  for (int i = 0; i < kPoseEntries; ++i)
+    if (i != 1) h[i] += one_h[i];
+  for (int i = 0; i < 6; ++i) g[i] += one_g[i];
 }
 
 /// The symmetric matrix whose upper triangle add_pose_normal() filled.
@@ -123,8 +134,9 @@ struct DenseResidual {
 DenseResidual dense_residual(const Intrinsics& camera, const SE3& camera_from_world,
                              const Eigen::Vector3d& point_in_world, const PointObservation& observation);
 
-/// Finite numbers and positive weights: an observation that a solver may use.
+/// Finite numbers of a size that squares do not overflow, and positive weights: what a solver may use.
 bool is_usable(const PointObservation& observation);
+bool is_usable(const Eigen::Vector3d& point);
 /// It carries a depth that a solver may use.
 bool has_depth(const PointObservation& observation);
 bool is_usable(const Intrinsics& camera);

@@ -133,6 +133,11 @@ TEST(Residuals, RecognisesUsableObservations) {
   EXPECT_FALSE(has_depth(o));
   o.inverse_variance_px = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(is_usable(o));
+  EXPECT_FALSE(is_usable(observation(1e200, 0, 1)));
+  EXPECT_FALSE(has_depth(observation(1, 2, 1e200)));
+  EXPECT_TRUE(is_usable(Eigen::Vector3d(1, -1e6, 3)));
+  EXPECT_FALSE(is_usable(Eigen::Vector3d(1, -1e200, 3)));
+  EXPECT_FALSE(is_usable(Eigen::Vector3d(1, kNan, 3)));
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ struct BundleOptions {
   double depth_outlier_share = 0;  // of the depths: disparity moved by 10..30 px
   double pose_error = 0.02;        // m and rad, of the start
   double point_error_m = 0.05;
+  int neighbours = 0;  // > 0: a point is seen by so many consecutive poses at most, not by poses all over
   std::uint32_t seed = 1;
 };
 
@@ -70,7 +71,9 @@ inline Bundle make_bundle(const BundleOptions& o) {
     p.points.push_back(out.true_points.back() + o.point_error_m * random3());
     const int first = static_cast<int>(rng() % static_cast<std::uint32_t>(o.poses));
     for (int s = 0; s < o.edges_per_point && s < o.poses; ++s) {
-      const int i = (first + s * std::max(1, o.poses / o.edges_per_point)) % o.poses;
+      const int stride = o.neighbours > 0 ? 1 : std::max(1, o.poses / o.edges_per_point);
+      const int i = (first + s * stride) % o.poses;
+      if (o.neighbours > 0 && (s >= o.neighbours || first + s >= o.poses)) break;
       const Eigen::Vector3d c = out.true_poses[static_cast<std::size_t>(i)] * out.true_points.back();
       const Eigen::Vector2d pixel = camera.project(c);
       if (c.z() < 0.3 || pixel.x() < 0 || pixel.y() < 0 || pixel.x() > 639 || pixel.y() > 479) continue;
