@@ -115,6 +115,41 @@ void make_one_to_one(std::size_t features, std::vector<Match>& matches) {
   matches.resize(kept);
 }
 
+/// Descriptors word by word: words w of neighbours stand side by side, as vector registers want them.
+class WordColumns {
+ public:
+  explicit WordColumns(std::span<const Descriptor> descriptors) {
+    for (std::size_t w = 0; w < words_.size(); ++w) {
+      words_[w].resize(descriptors.size());
+      for (std::size_t j = 0; j < descriptors.size(); ++j) words_[w][j] = descriptors[j][w];
+    }
+  }
+
+  /// Distances to all, as keys with the index j of the column's descriptor; lowers nearest[j] to the key with index i.
+  /// @return the least of keys. Compiled to VPOPCNTQ where the target has it.
+  std::uint64_t keys_of(const Descriptor& d, std::uint64_t i, std::span<std::uint64_t> keys,
+                        std::span<std::uint64_t> nearest) const {
+    const std::uint64_t *w0 = words_[0].data(), *w1 = words_[1].data(), *w2 = words_[2].data(), *w3 = words_[3].data();
+    const std::uint64_t d0 = d[0], d1 = d[1], d2 = d[2], d3 = d[3];
+    std::uint64_t* __restrict key = keys.data();
+    std::uint64_t* __restrict column = nearest.data();
+    std::uint64_t best = std::numeric_limits<std::uint64_t>::max();
+    const std::size_t n = keys.size();
+    for (std::size_t j = 0; j < n; ++j) {
+      const auto distance = static_cast<std::uint64_t>(std::popcount(w0[j] ^ d0) + std::popcount(w1[j] ^ d1) +
+                                                       std::popcount(w2[j] ^ d2) + std::popcount(w3[j] ^ d3))
+                            << 32;
+      key[j] = distance + j;
+      best = std::min(best, distance + j);
+      column[j] = std::min(column[j], distance + i);
+    }
+    return best;
+  }
+
+ private:
+  std::array<std::vector<std::uint64_t>, 4> words_;
+};
+
 }  // namespace
 
 void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures& features, const ImageGrid& grid,
@@ -138,29 +173,25 @@ void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures&
 void match_brute_force(std::span<const Descriptor> a, std::span<const Descriptor> b, const MatchOptions& options,
                        std::vector<Match>& out) {
   out.clear();
-  struct Nearest {
-    int index = -1, distance = kNoDistance;
-  };
-  std::vector<Nearest> nearest_to_b(b.size());
+  if (b.empty()) return;
+  const WordColumns columns(b);
+  // A key is distance * 2^32 + index: the least key is the nearest, and the lowest index among equally near ones.
+  std::vector<std::uint64_t> keys(b.size()), nearest_to_b(b.size(), std::numeric_limits<std::uint64_t>::max());
   for (std::size_t i = 0; i < a.size(); ++i) {
-    Nearest best;
-    int second = kNoDistance;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int distance = hamming_distance(a[i], b[j]);
-      if (distance < best.distance) {
-        second = best.distance;
-        best = {static_cast<int>(j), distance};
-      } else {
-        second = std::min(second, distance);
-      }
-      if (distance < nearest_to_b[j].distance) nearest_to_b[j] = {static_cast<int>(i), distance};
-    }
-    if (best.distance <= options.max_distance && passes_ratio(best.distance, second, options.ratio)) {
-      out.push_back({static_cast<int>(i), best.index, best.distance});
-    }
+    const std::uint64_t best = columns.keys_of(a[i], i, keys, nearest_to_b);
+    const auto distance = static_cast<int>(best >> 32);
+    if (distance > options.max_distance) continue;
+    // The least key above the best one: the best itself wraps round to the largest number there is.
+    std::uint64_t excess = std::numeric_limits<std::uint64_t>::max();
+    for (std::size_t j = 0; j < keys.size(); ++j) excess = std::min(excess, keys[j] - best - 1);
+    const bool alone = keys.size() == 1;
+    const int second = alone ? kNoDistance : static_cast<int>((best + 1 + excess) >> 32);
+    if (!passes_ratio(distance, second, options.ratio)) continue;
+    out.push_back({static_cast<int>(i), static_cast<int>(best & 0xffffffffu), distance});
   }
-  std::erase_if(out,
-                [&](const Match& m) { return nearest_to_b[static_cast<std::size_t>(m.feature)].index != m.query; });
+  std::erase_if(out, [&](const Match& m) {
+    return (nearest_to_b[static_cast<std::size_t>(m.feature)] & 0xffffffffu) != static_cast<std::uint64_t>(m.query);
+  });
 }
 
 }  // namespace semvslam
