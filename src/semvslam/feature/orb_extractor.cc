@@ -45,6 +45,7 @@ struct OrbExtractor::Impl {
 
   OrbOptions options;
   std::vector<float> scales;
+  std::vector<cv::Size> sizes;  // of the levels of the present image
   std::vector<cv::Mat> pyramid;
   Shrinker shrinker;
   Smoother smoother;
@@ -56,6 +57,7 @@ struct OrbExtractor::Impl {
   std::vector<std::vector<Corner>> corners;  // per level
   std::vector<Corner> selected;
   std::vector<int> budget;  // corners to take per level
+  std::vector<bool> full;   // levels that have no more corners to give
   CornerSelector selector;
 };
 
@@ -63,14 +65,13 @@ struct OrbExtractor::Impl {
 /// coordinates (pixel centre + 0.5) level and image differ by the ratio of their sizes exactly, also through a chain of
 /// resizes.
 void OrbExtractor::Impl::build_pyramid(const cv::Mat& gray) {
-  std::size_t usable = 0;
-  std::vector<cv::Size> sizes;
+  sizes.clear();
   for (const float scale : scales) {
     const cv::Size size(cvRound(static_cast<float>(gray.cols) / scale), cvRound(static_cast<float>(gray.rows) / scale));
     if (size.width <= 2 * kBorder || size.height <= 2 * kBorder) break;
     sizes.push_back(size);
-    ++usable;
   }
+  const std::size_t usable = sizes.size();
   pyramid.resize(usable);
   for (std::size_t l = 0; l < usable; ++l) {
     if (l == 0) {
@@ -98,7 +99,7 @@ void OrbExtractor::Impl::share_budget() {
   const std::size_t levels = pyramid.size();
   budget.assign(levels, 0);
   int left = options.features;
-  std::vector<bool> full(levels, false);
+  full.assign(levels, false);
   while (left > 0) {
     double weight = 0;
     for (std::size_t l = 0; l < levels; ++l) weight += full[l] ? 0 : 1 / scales[l];
