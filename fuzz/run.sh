@@ -1,13 +1,10 @@
 #!/usr/bin/env bash
 # Builds the fuzz targets with clang and runs each for SEMVSLAM_FUZZ_SECONDS (default 60).
-# usage: fuzz/run.sh [BUILD_FOLDER]       needs clang++ with libFuzzer (apt: clang-14); CXX chooses another one
+# usage: fuzz/run.sh [BUILD_FOLDER]       needs clang with its sanitizer run time (apt: clang-14 libclang-rt-14-dev)
 set -euo pipefail
-source=$(cd "$(dirname "$0")/.." && pwd)
-build=${1:-$source/build-fuzz}
+cd "$(dirname "$0")/.."
+build=${1:-build/fuzz}
 launcher=(); command -v ccache > /dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
-cmake -S "$source" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_CXX_COMPILER="${CXX:-clang++-14}" \
-  -DSEMVSLAM_FUZZ=ON -DSEMVSLAM_MODULES="base;geometry;data" -DSEMVSLAM_SANITIZE=fuzzer-no-link,address,undefined -DSEMVSLAM_BENCH=OFF \
-  -DSEMVSLAM_FUZZ_SECONDS="${SEMVSLAM_FUZZ_SECONDS:-60}" "${launcher[@]}"
-targets=(camera config file_lists png trajectory)
-cmake --build "$build" --target "${targets[@]/#/fuzz_}"
+cmake --preset fuzz -B "$build" -DSEMVSLAM_FUZZ_SECONDS="${SEMVSLAM_FUZZ_SECONDS:-60}" "${launcher[@]}"
+cmake --build "$build" -j "$(nproc)"
 ctest --test-dir "$build" -L fuzz --output-on-failure

@@ -5,7 +5,7 @@
 
 #include <csignal>
 
-#include "semvslam/data/test_support.h"
+#include "semvslam/data/data_test_support.h"
 
 namespace semvslam {
 namespace {

@@ -5,8 +5,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/data/data_test_support.h"
 #include "semvslam/data/png_test_support.h"
-#include "semvslam/data/test_support.h"
 
 namespace semvslam {
 namespace {

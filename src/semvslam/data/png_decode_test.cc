@@ -6,9 +6,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
+#include "semvslam/data/data_test_support.h"
 #include "semvslam/data/image_decode.h"
 #include "semvslam/data/png_test_support.h"
-#include "semvslam/data/test_support.h"
 
 namespace semvslam {
 namespace {

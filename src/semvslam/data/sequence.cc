@@ -176,6 +176,37 @@ void tell_warnings(const RecordedSequence& sequence, const fs::path& folder, std
   if (masks_missing > 0) say(fmt::format("{} frames have no mask", masks_missing));
 }
 
+bool is_icl_name(const fs::path& file) { return file.filename().string().ends_with(".gt.freiburg"); }
+
+fs::path ground_truth_file(const fs::path& folder) {
+  std::error_code error;
+  const fs::path usual = folder / "groundtruth.txt";
+  if (fs::exists(usual, error)) return usual;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    if (is_icl_name(it->path())) return it->path();
+  return usual;
+}
+
+bool has_frame_numbers(const Trajectory& trajectory) {
+  return std::all_of(trajectory.begin(), trajectory.end(),
+                     [](const StampedPose& p) { return p.stamp.ns % 1000000000 == 0; });
+}
+
+bool is_icl_folder(const fs::path& folder) {
+  const Result<SequenceLayout> layout = detect_layout(folder, 0);
+  return layout && layout->kind == SequenceKind::kIclNuim;
+}
+
+/// With S = diag(1, -1, 1) a pose (R, t) of their frames becomes (S R S, S t) of ours.
+void mirror_icl(Trajectory& trajectory) {
+  for (StampedPose& pose : trajectory) {
+    const Eigen::Vector3d& t = pose.world_from_camera.translation();
+    const Eigen::Quaterniond& q = pose.world_from_camera.rotation();
+    pose.stamp.ns = std::llround(static_cast<long double>(pose.stamp.ns) / kIclFrameRateHz);
+    pose.world_from_camera = SE3(Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z()), {t.x(), -t.y(), t.z()});
+  }
+}
+
 }  // namespace
 
 Result<std::unique_ptr<FrameSource>> open_sequence(const fs::path& folder, const SequenceOptions& options) {
@@ -198,20 +229,12 @@ Result<std::unique_ptr<FrameSource>> open_sequence(const fs::path& folder, const
 
 Result<Trajectory> read_ground_truth(const fs::path& path) {
   std::error_code error;
-  fs::path file = path;
-  if (fs::is_directory(path, error)) {
-    file = path / "groundtruth.txt";
-    for (fs::directory_iterator it(path, error), end; !fs::exists(file) && !error && it != end; it.increment(error))
-      if (it->path().filename().string().ends_with(".gt.freiburg")) file = it->path();
-  }
+  const bool is_folder = fs::is_directory(path, error);
+  const fs::path file = is_folder ? ground_truth_file(path) : path;
   Result<Trajectory> trajectory = read_trajectory(file);
-  if (!trajectory || !file.filename().string().ends_with(".gt.freiburg")) return trajectory;
-  for (StampedPose& pose : *trajectory) {
-    const Eigen::Vector3d& t = pose.world_from_camera.translation();
-    const Eigen::Quaterniond& q = pose.world_from_camera.rotation();
-    pose.stamp.ns = std::llround(static_cast<long double>(pose.stamp.ns) / kIclFrameRateHz);
-    pose.world_from_camera = SE3(Eigen::Quaterniond(q.w(), -q.x(), q.y(), -q.z()), {t.x(), -t.y(), t.z()});
-  }
+  if (!trajectory) return trajectory;
+  if (is_icl_name(file) || (is_folder && has_frame_numbers(*trajectory) && is_icl_folder(path)))
+    mirror_icl(*trajectory);
   return trajectory;
 }
 

@@ -31,9 +31,10 @@ struct SequenceOptions {
 Result<std::unique_ptr<FrameSource>> open_sequence(const std::filesystem::path& folder, const SequenceOptions& options);
 
 /// The reference trajectory of a recording: `path` is a trajectory file, or a sequence folder with groundtruth.txt or,
-/// for ICL-NUIM, one *.gt.freiburg file. Those (by the file's name) have frame numbers for stamps and a camera whose y
-/// axis points up; here they are turned into seconds (30 Hz) and our camera frame by mirroring y: (tx, -ty, tz), (-qx,
-/// qy, -qz, qw). Errors: as read_trajectory; a folder without one.
+/// for ICL-NUIM, one *.gt.freiburg file. ICL-NUIM's (known by that name, or as groundtruth.txt of a folder in its
+/// layout whose stamps are all whole numbers) has frame numbers for stamps and a camera whose y axis points up; here it
+/// is turned into seconds (30 Hz) and our camera frame by mirroring y: (tx, -ty, tz), (-qx, qy, -qz, qw). Errors: as
+/// read_trajectory; a folder without one.
 Result<Trajectory> read_ground_truth(const std::filesystem::path& path);
 
 }  // namespace semvslam

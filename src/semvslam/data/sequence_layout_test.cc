@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "semvslam/data/test_support.h"
+#include "semvslam/data/data_test_support.h"
 
 namespace semvslam {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "semvslam/data/test_support.h"
+#include "semvslam/data/data_test_support.h"
 
 namespace semvslam {
 namespace {
@@ -202,6 +202,11 @@ TEST(SequenceOnDisk, ReadsGroundTruthOfAFolderAndMirrorsIclNuim) {
   EXPECT_TRUE((pose.world_from_camera * mirror.cwiseProduct(p)).isApprox(mirror.cwiseProduct(theirs * p), 1e-12));
   write_text(folder / "groundtruth.txt", "3 1 2 3 0 0 0 1\n");
   EXPECT_EQ(read_ground_truth(folder.path())->front().stamp.ns, 3000000000);
+  EXPECT_EQ(read_ground_truth(folder / "groundtruth.txt")->front().stamp.ns, 3000000000);
+  // The same file renamed, as many do: the folder's layout tells.
+  write_text(folder / "associations.txt", "3 depth/3.png 3 rgb/3.png\n");
+  EXPECT_EQ(read_ground_truth(folder.path())->front().stamp.ns, 100000000);
+  EXPECT_EQ(read_ground_truth(folder.path())->front().world_from_camera.translation().y(), -2);
 }
 
 }  // namespace

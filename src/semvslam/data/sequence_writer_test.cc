@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "semvslam/data/data_test_support.h"
 #include "semvslam/data/sequence.h"
-#include "semvslam/data/test_support.h"
 
 namespace semvslam {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "semvslam/data/test_support.h"
+#include "semvslam/data/data_test_support.h"
 
 namespace semvslam {
 namespace {
