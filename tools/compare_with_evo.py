@@ -14,6 +14,7 @@ evo's counterparts:   semvslam eval GT EST              evo_ape tum GT EST -a --
                       (deg)                             -r angle_deg
 evo has no step in seconds."""
 import argparse
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -71,6 +72,9 @@ def main():
     args = parser.parse_args()
     if not args.program and not args.write:
         parser.error("one of --program and --write is needed")
+    if importlib.util.find_spec("evo") is None:
+        print("skipped: evo is not installed (pip install evo)")
+        return 77
     checked = failed = skipped = 0
     for file in args.files:
         content = json.loads(file.read_text())

@@ -1,11 +1,14 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <span>
 #include <string_view>
 
 #include "semvslam/base/result.h"
+
+namespace CLI {
+class App;
+}
 
 namespace semvslam {
 
@@ -33,6 +36,10 @@ struct Command {
 /// The sub-commands in the order in which the help shows them.
 std::span<const Command> commands();
 
+CommandHandler setup_run(CLI::App& parser);
+CommandHandler setup_demo(CLI::App& parser);
+CommandHandler setup_render(CLI::App& parser);
+CommandHandler setup_config(CLI::App& parser);
 CommandHandler setup_eval(CLI::App& parser);
 CommandHandler setup_version(CLI::App& parser);
 

@@ -6,7 +6,11 @@ namespace semvslam {
 
 std::span<const Command> commands() {
   static constexpr std::array kCommands = {
+      Command{"demo", "the main job on a rendered room with people in it", setup_demo},
+      Command{"run", "the main job: trajectory, key frames, map and statistics of a recording", setup_run},
       Command{"eval", "measure a trajectory against the ground truth: ATE, RPE, improvement, plot", setup_eval},
+      Command{"render", "write a rendered recording with exact ground truth and masks", setup_render},
+      Command{"config", "show every configuration value with its meaning", setup_config},
       Command{"version", "print the version", setup_version},
   };
   return kCommands;

@@ -11,4 +11,7 @@ std::int64_t peak_memory_bytes();
 /// Resident memory of this process now, bytes; 0 where the system does not tell.
 std::int64_t resident_memory_bytes();
 
+/// Seconds since this process started (to the system's clock tick, usually 10 ms); 0 where the system does not tell.
+double process_age_seconds();
+
 }  // namespace semvslam

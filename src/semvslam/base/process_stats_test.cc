@@ -29,5 +29,12 @@ TEST(ProcessStats, PeakMemoryCoversAnAllocationAndStays) {
   EXPECT_GT(peak_memory_bytes(), before + kSize / 2);
 }
 
+TEST(ProcessStats, AgeIsSmallAndGrows) {
+  const double first = process_age_seconds();
+  EXPECT_GE(first, 0.0);
+  EXPECT_LT(first, 3600.0);
+  EXPECT_GE(process_age_seconds(), first);
+}
+
 }  // namespace
 }  // namespace semvslam

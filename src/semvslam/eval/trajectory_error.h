@@ -61,8 +61,8 @@ struct RelativeErrorOptions {
 };
 
 /// Steps count paired poses (frames), or look for the pair whose stamp is nearest to start + delta (seconds) and at
-/// most a tenth of delta away from it, so that no step spans a stretch where tracking was lost. Errors: no two pairs
-/// are one delta apart.
+/// most a twentieth of delta away from it, so that no step spans a stretch where tracking was lost. Errors: no two
+/// pairs are one delta apart.
 Result<RelativeError> relative_error(const Trajectory& reference, const Trajectory& estimate,
                                      const std::vector<PosePair>& pairs, const RelativeErrorOptions& options);
 

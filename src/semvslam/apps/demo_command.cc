@@ -1,0 +1,76 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+#include "semvslam/apps/command.h"
+#include "semvslam/apps/render_scene.h"
+#include "semvslam/apps/run_session.h"
+#include "semvslam/data/sequence.h"
+
+namespace semvslam {
+namespace fs = std::filesystem;
+
+namespace {
+
+struct DemoArguments {
+  SceneOptions scene;
+  std::string out = "semvslam_demo";
+  bool quiet = false;
+};
+
+/// $XDG_CACHE_HOME/semvslam, ~/.cache/semvslam, or a folder beside the results where neither is known.
+fs::path cache_folder(const fs::path& fallback) {
+  if (const char* xdg = std::getenv("XDG_CACHE_HOME"); xdg != nullptr && *xdg != '\0')
+    return fs::path(xdg) / "semvslam";
+  if (const char* home = std::getenv("HOME"); home != nullptr && *home != '\0')
+    return fs::path(home) / ".cache/semvslam";
+  return fallback / "cache";
+}
+
+Result<int> demo(const DemoArguments& a) {
+  const fs::path cache = cache_folder(a.out);
+  // The version is part of the name: another version may render other pictures.
+  const fs::path sequence =
+      cache / fmt::format("demo_{}_{}_{}_{}x{}_{}_{}", SEMVSLAM_VERSION, a.scene.people, a.scene.motion,
+                          a.scene.width_px, a.scene.height_px, a.scene.frames, a.scene.seed);
+  if (!fs::exists(sequence)) {
+    std::error_code code;
+    fs::create_directories(cache, code);
+    if (code)
+      return Error{ErrorCode::kIo,
+                   fmt::format("{}: cannot make the cache folder ({})", cache.string(), code.message())};
+    if (!a.quiet) fmt::print(stderr, "rendering {} frames to {}\n", a.scene.frames, sequence.string());
+    if (const Status status = render_to_folder(a.scene, sequence, false, a.quiet); !status) return status.error();
+  }
+  Result<std::unique_ptr<FrameSource>> source = open_sequence(sequence, {});
+  if (!source) return source.error();
+  Config config;
+  RunOptions options;
+  options.out = a.out;
+  options.quiet = a.quiet;
+  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
+  if (!outcome) return outcome.error();
+  return conclude_run(*outcome, sequence, options.out);
+}
+
+}  // namespace
+
+CommandHandler setup_demo(CLI::App& parser) {
+  auto a = std::make_shared<DemoArguments>();
+  a->scene.frames = 240;
+  parser.add_option("--out", a->out, "folder for the results")->capture_default_str();
+  parser.add_option("--people", a->scene.people, "walking, sitting, carrying or none")->capture_default_str();
+  parser.add_option("--motion", a->scene.motion, "of the camera: xyz, rpy, halfsphere, static or tour")
+      ->capture_default_str();
+  parser.add_option("--frames", a->scene.frames, "how many")->capture_default_str();
+  parser.add_option("--seed", a->scene.seed, "of everything that is random")->capture_default_str();
+  parser.add_flag("--quiet", a->quiet, "no progress on the terminal");
+  return [a] { return demo(*a); };
+}
+
+}  // namespace semvslam

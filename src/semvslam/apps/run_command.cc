@@ -1,0 +1,82 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "semvslam/apps/command.h"
+#include "semvslam/apps/run_session.h"
+#include "semvslam/data/file_io.h"
+#include "semvslam/data/sequence.h"
+
+namespace semvslam {
+namespace {
+
+struct RunArguments {
+  std::string sequence, out, config_file, mode, camera, preset, masks;
+  std::vector<std::string> assignments;
+  std::uint64_t max_frames = 0;
+  bool deterministic = false, realtime = false, quiet = false;
+};
+
+/// The file first, then --set, then the options that have names of their own: the more special wins.
+Status fill_config(const RunArguments& a, Config& config) {
+  ConfigSchema schema = config.schema();
+  if (!a.config_file.empty()) {
+    const Result<std::string> text = read_text_file(a.config_file, 1 << 20);
+    if (!text) return text.error();
+    if (Status status = schema.load_yaml(*text, a.config_file); !status) return status;
+  }
+  for (const std::string& assignment : a.assignments)
+    if (Status status = schema.set(assignment); !status) return status;
+  if (!a.mode.empty())
+    if (Status status = schema.set("mode=" + a.mode); !status) return status;
+  if (a.deterministic) config.deterministic = true;
+  if (a.realtime) config.realtime = true;
+  return Status::success();
+}
+
+Result<int> run(const RunArguments& a) {
+  Config config;
+  if (const Status status = fill_config(a, config); !status) return status.error();
+  SequenceOptions sequence_options;
+  sequence_options.camera_file = a.camera;
+  sequence_options.camera_preset = a.preset;
+  sequence_options.mask_folder = a.masks;
+  if (!a.quiet)
+    sequence_options.on_warning = [](const std::string& line) { fmt::print(stderr, "semvslam: warning: {}\n", line); };
+  Result<std::unique_ptr<FrameSource>> source = open_sequence(a.sequence, sequence_options);
+  if (!source) return source.error();
+
+  RunOptions options;
+  options.out = a.out;
+  options.quiet = a.quiet;
+  if (a.max_frames > 0) options.max_frames = a.max_frames;
+  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
+  if (!outcome) return outcome.error();
+  return conclude_run(*outcome, a.sequence, options.out);
+}
+
+}  // namespace
+
+CommandHandler setup_run(CLI::App& parser) {
+  auto a = std::make_shared<RunArguments>();
+  parser.add_option("SEQUENCE", a->sequence, "folder of a recording: TUM RGB-D, Bonn, ICL-NUIM or plain images")
+      ->required();
+  parser.add_option("--out", a->out, "folder for the results; made when missing, earlier results in it are replaced")
+      ->required();
+  parser.add_option("--config", a->config_file, "YAML file with values ('semvslam config' shows all of them)");
+  parser.add_option("--set", a->assignments, "one value, key=value; may be repeated")->allow_extra_args(false);
+  parser.add_option("--mode", a->mode, "preset: which evidence of motion is used (the key 'mode')");
+  parser.add_option("--camera", a->camera, "camera YAML, where the recording has none or another one is wanted");
+  parser.add_option("--camera-preset", a->preset, "built-in camera, e.g. tum_fr3");
+  parser.add_option("--masks", a->masks, "folder with one PNG per frame, non-zero = pixel of something that may move");
+  parser.add_option("--max-frames", a->max_frames, "stop after this many frames")->check(CLI::PositiveNumber);
+  parser.add_flag("--deterministic", a->deterministic, "two runs give the same bytes (slower: one thread)");
+  parser.add_flag("--realtime", a->realtime, "keep the pace of the stamps, drop frames that come too late");
+  parser.add_flag("--quiet", a->quiet, "no progress and no warnings on the terminal");
+  return [a] { return run(*a); };
+}
+
+}  // namespace semvslam

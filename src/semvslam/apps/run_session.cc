@@ -1,0 +1,245 @@
+#include "semvslam/apps/run_session.h"
+
+#include <fmt/core.h>
+
+#include <chrono>
+#include <mutex>
+#include <thread>
+
+#include "semvslam/apps/interrupt.h"
+#include "semvslam/apps/progress.h"
+#include "semvslam/apps/run_output.h"
+#include "semvslam/base/bounded_queue.h"
+#include "semvslam/base/process_stats.h"
+#include "semvslam/base/stage_timer.h"
+#include "semvslam/data/prefetch.h"
+
+namespace semvslam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::size_t kFramesAhead = 6;
+constexpr std::uint64_t kSkipsShown = 3;  // on the terminal; all are in run.log
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+const char* state_name(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitializing:
+      return "initializing";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "";
+}
+
+/// Writes stats.json about once a second from a thread of its own: asking the system for its statistics waits for a
+/// mapping step, and replacing a file waits for the disk; neither may stand between two frames.
+class Checkpoints {
+ public:
+  Checkpoints(const Slam& slam, const RunOutput& output) : slam_(slam), output_(output) {
+    thread_ = std::jthread([this] {
+      while (const auto record = records_.pop())
+        // A failure here shows again, and is reported, when the final statistics are written.
+        static_cast<void>(output_.write("stats.json", format_statistics(*record, slam_.statistics())));
+    });
+  }
+  ~Checkpoints() { records_.close(); }
+
+  /// Calls `record` and takes its result when a second has passed since the last one.
+  template <typename MakeRecord>
+  void offer(const MakeRecord& record) {
+    if (seconds_since(last_) < 0.9) return;
+    last_ = Clock::now();
+    RunRecord now = record();
+    records_.try_push(now);  // refused while the disk is slower than a second: the next one will do
+  }
+
+ private:
+  const Slam& slam_;
+  const RunOutput& output_;
+  Clock::time_point last_ = Clock::now() - std::chrono::seconds(10);
+  BoundedQueue<RunRecord> records_{1};
+  std::jthread thread_;  // last: ends before what it uses
+};
+
+/// Keeps the camera's pace: waits until a frame is due, and tells which frames come too late.
+class Pace {
+ public:
+  explicit Pace(double frame_rate_hz) : period_s_(1 / frame_rate_hz) {}
+
+  /// Waits until `stamp` is due. @return false when the next frame is due already: this one should be dropped.
+  bool keep(TimeStamp stamp) {
+    if (!first_) first_ = stamp, start_ = Clock::now();
+    const double due_s = static_cast<double>(stamp.ns - first_->ns) * 1e-9;
+    if (seconds_since(start_) > due_s + period_s_) return false;
+    std::this_thread::sleep_until(start_ +
+                                  std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(due_s)));
+    return true;
+  }
+
+ private:
+  const double period_s_;
+  std::optional<TimeStamp> first_;
+  Clock::time_point start_;
+};
+
+class Session {
+ public:
+  Session(FrameSource& source, const Config& config, Slam& slam, RunOutput& output, const RunOptions& options,
+          RunRecord record)
+      : source_(source),
+        slam_(slam),
+        output_(output),
+        options_(options),
+        realtime_(config.realtime),
+        record_(std::move(record)),
+        progress_(total_frames(source, options), options.quiet) {}
+
+  /// @return why the run ended before the source did; a success at the end of the source, at max_frames and on a
+  /// signal.
+  Status run();
+  RunRecord record(const std::string& end) const;
+
+ private:
+  static std::optional<std::uint64_t> total_frames(const FrameSource& source, const RunOptions& options) {
+    if (!source.size()) return options.max_frames;
+    const std::uint64_t all = *source.size();
+    return options.max_frames ? std::min(all, *options.max_frames) : all;
+  }
+  Status use(const RgbdFrame& frame);
+  void skip(const Error& error);
+  void note_state(const TrackResult& result);
+
+  FrameSource& source_;
+  Slam& slam_;
+  RunOutput& output_;
+  const RunOptions& options_;
+  const bool realtime_;
+  RunRecord record_;
+  StageTimer input_{"input"};
+  Progress progress_;
+  Clock::time_point start_ = Clock::now();
+  TrackingState state_ = TrackingState::kInitializing;
+  bool disk_trouble_ = false;
+};
+
+RunRecord Session::record(const std::string& end) const {
+  RunRecord out = record_;
+  out.wall_s = seconds_since(start_);
+  out.cpu_s = process_cpu_seconds();
+  out.peak_memory_bytes = peak_memory_bytes();
+  out.input = input_.summary();
+  out.end = end;
+  return out;
+}
+
+void Session::skip(const Error& error) {
+  ++record_.skipped;
+  output_.log("warning", "skipped: " + error.message);
+  if (record_.skipped <= kSkipsShown) progress_.message("semvslam: warning: skipped: " + error.message);
+  if (record_.skipped == kSkipsShown)
+    progress_.message("semvslam: warning: further skipped frames are listed in run.log");
+}
+
+void Session::note_state(const TrackResult& result) {
+  if (result.state == state_) return;
+  output_.log("info", fmt::format("frame {} at {:.6f} s: {} -> {}", result.frame.value, result.stamp.seconds(),
+                                  state_name(state_), state_name(result.state)));
+  state_ = result.state;
+}
+
+Status Session::use(const RgbdFrame& frame) {
+  const Result<TrackResult> result = slam_.process(frame);
+  if (!result) {
+    if (result.error().code == ErrorCode::kInternal) return result.error();
+    skip(result.error());
+    return Status::success();
+  }
+  note_state(*result);
+  if (result->state != TrackingState::kTracking) return Status::success();
+  const Status written = output_.add_pose({result->stamp, result->world_from_camera});
+  if (!written && !disk_trouble_) progress_.message("semvslam: warning: " + written.error().message + "; trying on");
+  disk_trouble_ = !written;
+  return Status::success();
+}
+
+Status Session::run() {
+  Pace pace(source_.camera().frame_rate_hz);
+  Checkpoints checkpoints(slam_, output_);
+  start_ = Clock::now();
+  while (InterruptGuard::received() == 0 && (!options_.max_frames || record_.read < *options_.max_frames)) {
+    Result<std::optional<RgbdFrame>> next = [&] {
+      const auto timing = input_.time();
+      return source_.next();
+    }();
+    if (!next && source_.fatal()) return next.error();
+    if (next && !*next) break;
+    ++record_.read;
+    if (!next) {
+      skip(next.error());
+    } else if (realtime_ && !pace.keep((*next)->stamp)) {
+      ++record_.dropped;
+    } else if (const Status status = use(**next); !status) {
+      return status;
+    }
+    progress_.update(record_.read, state_name(state_));
+    checkpoints.offer([&] { return record("running"); });
+  }
+  progress_.end();
+  return Status::success();
+}
+
+std::string end_text(const Status& status, int signal) {
+  if (!status) return status.error().message;
+  if (signal == SIGINT) return "interrupted (SIGINT)";
+  if (signal != 0) return "interrupted (SIGTERM)";
+  return "complete";
+}
+
+void keep_first(Status& first, Status status) {
+  if (first && !status) first = std::move(status);
+}
+
+}  // namespace
+
+Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& config, const RunOptions& options) {
+  const InterruptGuard interrupt;
+  Result<RunOutput> output = RunOutput::create(options.out);
+  if (!output) return output.error();
+  Result<std::unique_ptr<Slam>> slam = Slam::create(config, source->camera());
+  if (!slam) return slam.error();
+  if (const Status status = output->write("config.yaml", config.schema().dump_yaml()); !status) return status.error();
+  RunRecord record;
+  record.sequence = source->description();
+  record.mode = config.mode;
+  record.deterministic = config.deterministic;
+  record.realtime = config.realtime;
+  record.start_up_s = process_age_seconds();
+  output->log("info", fmt::format("semvslam {}: {}", SEMVSLAM_VERSION, record.sequence));
+
+  RunOutcome outcome;
+  {
+    const std::unique_ptr<FrameSource> ahead = prefetch(std::move(source), kFramesAhead);
+    Session session(*ahead, config, **slam, *output, options, std::move(record));
+    outcome.status = session.run();
+    outcome.signal = InterruptGuard::received();
+    keep_first(outcome.status, (*slam)->finish());
+    outcome.record = session.record(end_text(outcome.status, outcome.signal));
+  }
+  outcome.statistics = (*slam)->statistics();
+  outcome.trajectory = (*slam)->trajectory();
+  keep_first(outcome.status,
+             output->write_results(outcome.trajectory, (*slam)->key_frame_trajectory(), (*slam)->landmark_positions()));
+  keep_first(outcome.status, output->write("stats.json", format_statistics(outcome.record, outcome.statistics)));
+  if (outcome.status && outcome.signal == 0 && outcome.statistics.tracked == 0)
+    outcome.status =
+        Error{ErrorCode::kInvalidInput, fmt::format("none of the {} frames could be tracked (see {})",
+                                                    outcome.record.read, (options.out / "run.log").string())};
+  output->log("info", outcome.record.end);
+  return outcome;
+}
+
+}  // namespace semvslam

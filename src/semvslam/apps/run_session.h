@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "semvslam/apps/run_statistics.h"
+#include "semvslam/base/result.h"
+#include "semvslam/data/frame.h"
+#include "semvslam/pipeline/config.h"
+
+namespace semvslam {
+
+struct RunOptions {
+  std::filesystem::path out;
+  std::optional<std::uint64_t> max_frames;
+  bool quiet = false;
+};
+
+/// How a run ended; everything computed is in the output folder.
+struct RunOutcome {
+  RunRecord record;
+  SlamStatistics statistics;
+  Trajectory trajectory;  // as in trajectory.txt
+  int signal = 0;         // that ended it early; 0 = none
+  Status status;          // why it is not a success although results were written
+};
+
+/// Runs the system over all frames of `source` and writes the results. A frame that cannot be used is skipped, counted
+/// and logged. An interrupt, a fatal error of the source or of the system ends the run early, with its results written;
+/// so do no errors of the disk: the run goes on and what failed is tried again at its end.
+/// @return an Error when nothing could be started: output folder, camera.
+Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& config, const RunOptions& options);
+
+/// Prints the summary of a run and, where `sequence` has a ground truth, its score, which is written to evaluation.json
+/// and evaluation.svg too. @return the exit code of the program, or why the run is no success.
+Result<int> conclude_run(const RunOutcome& outcome, const std::filesystem::path& sequence,
+                         const std::filesystem::path& out);
+
+}  // namespace semvslam

@@ -1,0 +1,65 @@
+#include "semvslam/apps/run_statistics.h"
+
+#include <fmt/core.h>
+
+#include <nlohmann/json.hpp>
+
+namespace semvslam {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json stage_to_json(const StageSummary& s) {
+  return {{"count", s.count}, {"mean", s.mean_ms}, {"median", s.median_ms}, {"p95", s.p95_ms}, {"max", s.max_ms}};
+}
+
+double per_frame(double seconds, std::uint64_t frames) {
+  return frames == 0 ? 0 : seconds * 1e3 / static_cast<double>(frames);
+}
+
+}  // namespace
+
+std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) {
+  Json stages = Json::object();
+  stages["input"] = stage_to_json(run.input);
+  for (const StageSummary& stage : slam.stages) stages[stage.name] = stage_to_json(stage);
+  const double share = run.read == 0 ? 0 : static_cast<double>(slam.tracked) / static_cast<double>(run.read);
+  const Json json = {{"version", SEMVSLAM_VERSION},
+                     {"sequence", run.sequence},
+                     {"mode", run.mode},
+                     {"deterministic", run.deterministic},
+                     {"realtime", run.realtime},
+                     {"end", run.end},
+                     {"frames", run.read},
+                     {"skipped", run.skipped},
+                     {"dropped", run.dropped},
+                     {"tracked", slam.tracked},
+                     {"lost", slam.lost},
+                     {"tracked_share", share},
+                     {"key_frames", slam.key_frames},
+                     {"landmarks", slam.landmarks},
+                     {"stages_ms", stages},
+                     {"start_up_s", run.start_up_s},
+                     {"wall_s", run.wall_s},
+                     {"cpu_s", run.cpu_s},
+                     {"cpu_ms_per_frame", per_frame(run.cpu_s, run.read)},
+                     {"frames_per_s", run.wall_s > 0 ? static_cast<double>(run.read) / run.wall_s : 0.0},
+                     {"peak_memory_mb", static_cast<double>(run.peak_memory_bytes) / 1e6}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string format_summary(const RunRecord& run, const SlamStatistics& slam) {
+  std::string out = fmt::format("{} frames, {} tracked, {} lost", run.read, slam.tracked, slam.lost);
+  if (run.skipped > 0) out += fmt::format(", {} skipped as unusable (see run.log)", run.skipped);
+  if (run.dropped > 0) out += fmt::format(", {} dropped to keep pace", run.dropped);
+  out += fmt::format("; {} key frames, {} landmarks\n", slam.key_frames, slam.landmarks);
+  for (const StageSummary& stage : slam.stages)
+    if (stage.name == "tracking" || stage.name == "mapping")
+      out += fmt::format("{:<9} mean {:.2f}  median {:.2f}  p95 {:.2f}  max {:.2f} ms\n", stage.name, stage.mean_ms,
+                         stage.median_ms, stage.p95_ms, stage.max_ms);
+  out += fmt::format("wall {:.2f} s, CPU {:.2f} s ({:.2f} ms per frame), peak memory {:.0f} MB\n", run.wall_s,
+                     run.cpu_s, per_frame(run.cpu_s, run.read), static_cast<double>(run.peak_memory_bytes) / 1e6);
+  return out;
+}
+
+}  // namespace semvslam

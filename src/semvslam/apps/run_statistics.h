@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "semvslam/pipeline/slam.h"
+
+namespace semvslam {
+
+/// What a run is, and how far it got, beside what the system itself counts.
+struct RunRecord {
+  std::string sequence, mode;  // `sequence`: description of the source
+  bool deterministic = false, realtime = false;
+  std::uint64_t read = 0;     // frames that the source gave
+  std::uint64_t skipped = 0;  // frames that could not be used, each with a line in run.log
+  std::uint64_t dropped = 0;  // frames left out to keep the camera's pace (realtime)
+  double start_up_s = 0;      // from the start of the process to the first frame
+  double wall_s = 0;          // of the frames
+  double cpu_s = 0;           // of the whole process
+  std::int64_t peak_memory_bytes = 0;
+  StageSummary input;  // waiting for frames
+  std::string end;     // "complete", "running", or why it ended early
+};
+
+/// Content of stats.json.
+std::string format_statistics(const RunRecord& run, const SlamStatistics& slam);
+/// Some lines for people.
+std::string format_summary(const RunRecord& run, const SlamStatistics& slam);
+
+}  // namespace semvslam

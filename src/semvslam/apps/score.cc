@@ -1,0 +1,44 @@
+#include <fmt/core.h>
+
+#include "semvslam/apps/command.h"
+#include "semvslam/apps/run_session.h"
+#include "semvslam/data/file_io.h"
+#include "semvslam/data/sequence.h"
+#include "semvslam/eval/evaluation.h"
+
+namespace semvslam {
+namespace {
+
+Status score(const Trajectory& truth, const std::string& truth_name, const Trajectory& trajectory,
+             const std::filesystem::path& out) {
+  EvaluationReport report;
+  report.reference_name = truth_name;
+  Result<Evaluation> evaluation = evaluate(truth, trajectory, report.options);
+  if (!evaluation) {
+    fmt::print(stderr, "semvslam: warning: no score: {}\n", evaluation.error().message);
+    return Status::success();
+  }
+  report.estimate = {(out / "trajectory.txt").string(), std::move(*evaluation)};
+  fmt::print("{}", format_text(report));
+  if (Status status = write_file_atomically(out / "evaluation.json", format_json(report)); !status) return status;
+  return write_file_atomically(out / "evaluation.svg", format_svg(report));
+}
+
+}  // namespace
+
+Result<int> conclude_run(const RunOutcome& outcome, const std::filesystem::path& sequence,
+                         const std::filesystem::path& out) {
+  fmt::print("{}", format_summary(outcome.record, outcome.statistics));
+  Status scored;
+  if (const Result<Trajectory> truth = read_ground_truth(sequence); truth)
+    scored = score(*truth, sequence.string(), outcome.trajectory, out);
+  else if (truth.error().code != ErrorCode::kNotFound)
+    fmt::print(stderr, "semvslam: warning: no score: {}\n", truth.error().message);
+  fmt::print("results in {}\n", out.string());
+  if (outcome.signal != 0) return 128 + outcome.signal;
+  if (!outcome.status) return outcome.status.error();
+  if (!scored) return scored.error();
+  return static_cast<int>(kExitSuccess);
+}
+
+}  // namespace semvslam
