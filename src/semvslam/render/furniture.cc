@@ -223,6 +223,30 @@ void Furnisher::mug(const SE3& pose) {
   builder_.tube(handle, std::vector<double>(7, 0.006), 6, plain(white_));
 }
 
+void Furnisher::bin(const SE3& pose) {
+  builder_.begin_mesh();
+  builder_.lathe(pose, {{0.001, 0.002}, {0.11, 0.002}, {0.14, 0.30}, {0.132, 0.30}, {0.10, 0.05}, {0.001, 0.05}}, 18, plain(grey_));
+}
+
+void Furnisher::curtain(const SE3& pose, double width_m, double height_m) {
+  builder_.begin_mesh();
+  constexpr int kFolds = 10;
+  const Skin cloth{fabric_[random_.below(3)], {0.35, 0.35}, {0, 0}, false};
+  Eigen::Vector3d last;
+  for (int i = 0; i <= kFolds; ++i) {
+    const double depth = (i % 2 ? -0.05 : -0.015) + random_.uniform(-0.01, 0.01);
+    const Eigen::Vector3d here = pose * Eigen::Vector3d(-width_m / 2 + width_m * i / kFolds, depth, 0);
+    if (i > 0) builder_.quad(last, here - last, {0, 0, height_m}, cloth, 0.3);
+    last = here;
+  }
+}
+
+void Furnisher::wall_plate(const SE3& pose) {
+  builder_.begin_mesh();
+  builder_.box(pose * on_plan(0, -0.005), {0.082, 0.009, 0.082}, plain(white_), plain(white_), plain(white_), false);
+  builder_.box(pose * on_plan(0, -0.012, 0.016), {0.05, 0.006, 0.05}, plain(grey_), plain(white_), plain(grey_), false);
+}
+
 void Furnisher::bottle(const SE3& pose) {
   const double r = random_.uniform(0.03, 0.042), h = random_.uniform(0.2, 0.28);
   builder_.lathe(pose, {{r, 0}, {r, h * 0.62}, {r * 0.4, h * 0.82}, {r * 0.36, h}, {0.001, h}}, 16, Skin{label_[random_.below(4)], {0, 0}, {0, 0}, false});

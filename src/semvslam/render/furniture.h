@@ -26,6 +26,11 @@ class Furnisher {
   void floor_lamp(const SE3& pose);
   void carton(const SE3& pose, const Eigen::Vector3d& size_m);
   void mug(const SE3& pose);
+  void bin(const SE3& pose);
+  /// Folded cloth; the pose's origin is the lower middle, in front of the wall.
+  void curtain(const SE3& pose, double width_m, double height_m);
+  /// A light switch or socket on a wall.
+  void wall_plate(const SE3& pose);
   void bottle(const SE3& pose);
   void book_stack(const SE3& pose, int books);
   void pages(const SE3& pose, int sheets);

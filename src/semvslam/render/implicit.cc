@@ -6,6 +6,8 @@
 namespace semvslam::render {
 namespace {
 
+constexpr float kRim_m = 0.010f;  // rounding of cut edges
+
 float smooth_min(float a, float b, float k) {
   const float h = std::max(k - std::abs(a - b), 0.f) / k;
   return std::min(a, b) - h * h * k * 0.25f;
@@ -71,7 +73,7 @@ float ImplicitShape::value(const Eigen::Vector3f& p) const {
     }
   }
   if (displacement_ && std::abs(sum) < 0.08f) sum -= displacement_(p);
-  for (const Plane& plane : planes_) sum = std::max(sum, (p - plane.point).dot(plane.normal));
+  for (const Plane& plane : planes_) sum = -smooth_min(-sum, -(p - plane.point).dot(plane.normal), kRim_m);
   return sum;
 }
 

@@ -104,6 +104,10 @@ bool ShadowTester::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& d
 }
 
 LightModel::LightModel(const std::vector<AreaLight>& lights) {
+  for (int i = 0; i < kAmbientRays; ++i) {  // a spiral
+    const float r2 = (static_cast<float>(i) + 0.5f) / kAmbientRays, angle = 2.399963f * static_cast<float>(i);
+    hemisphere_.emplace_back(std::sqrt(r2) * std::cos(angle), std::sqrt(r2) * std::sin(angle), std::sqrt(1 - r2));
+  }
   for (const AreaLight& l : lights) {
     sources_.push_back({l.centre.cast<float>(), l.half_u.cast<float>(), l.half_v.cast<float>(), l.normal.cast<float>(), l.radiance.cast<float>(),
                         static_cast<float>(4 * l.half_u.norm() * l.half_v.norm())});
@@ -135,10 +139,8 @@ Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& n
   if (tester) {
     const Eigen::Vector3f side = normal.unitOrthogonal(), other = normal.cross(side);
     int free = 0;
-    for (int i = 0; i < kAmbientRays; ++i) {  // cosine-weighted spiral
-      const float r2 = (static_cast<float>(i) + 0.5f) / kAmbientRays, angle = 2.399963f * static_cast<float>(i);
-      const Eigen::Vector3f d = std::sqrt(r2) * (std::cos(angle) * side + std::sin(angle) * other) + std::sqrt(1 - r2) * normal;
-      free += !tester->blocked(lifted, d, kAmbientReach_m);
+    for (const Eigen::Vector3f& d : hemisphere_) {
+      free += !tester->blocked(lifted, d.x() * side + d.y() * other + d.z() * normal, kAmbientReach_m);
     }
     open = static_cast<float>(free) / kAmbientRays;
   }

@@ -50,6 +50,7 @@ class LightModel {
     float area_m2;
   };
   std::vector<Source> sources_;
+  std::vector<Eigen::Vector3f> hemisphere_;  // cosine-weighted directions, z = the normal
 };
 
 /// Fills the atlas and the vertices' brightness.

@@ -11,8 +11,13 @@ namespace {
 
 cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
 
+/// What printed things look like: warm and muted tones more often than pure ones.
 cv::Scalar any_colour(RandomStream& random, double saturation, double low, double high) {
-  return scalar(hue_colour(random.uniform(), saturation * random.uniform(0.4, 1.0), random.uniform(low, high)));
+  const double kind = random.uniform(), strength = saturation * random.uniform(0.4, 1.0), value = random.uniform(low, high);
+  if (kind < 0.2) return scalar(hue_colour(0.1, 0.12 * saturation, value));                                 // grey, paper
+  if (kind < 0.55) return scalar(hue_colour(std::fmod(1.02 + 0.05 * random.normal(), 1.0), strength, value));  // red to ochre
+  if (kind < 0.75) return scalar(hue_colour(0.6 + 0.04 * random.normal(), 0.8 * strength, value));             // blue
+  return scalar(hue_colour(random.uniform(), 0.75 * strength, value));
 }
 
 /// A word of random letters; syllables, so that word shapes look like writing.
@@ -49,7 +54,7 @@ void add_grain(cv::Mat& image, float strength, std::uint32_t seed) {
     auto* row = image.ptr<cv::Vec3b>(y);
     for (int x = 0; x < image.cols; ++x) {
       const float fx = static_cast<float>(x), fy = static_cast<float>(y);
-      const float n = 1.f + strength * (fractal_noise(fx * 0.02f, fy * 0.02f, seed, 4096, 4) - 0.5f) +
+      const float n = 1.f + strength * (fractal_noise(fx * 0.02f, fy * 0.02f, seed, 4096, 2) - 0.5f) +
                       strength * 0.4f * (lattice_hash(x, y, seed) - 0.5f);
       for (int c = 0; c < 3; ++c) row[x][c] = cv::saturate_cast<std::uint8_t>(static_cast<float>(row[x][c]) * n);
     }

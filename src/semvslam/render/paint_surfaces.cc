@@ -37,47 +37,61 @@ cv::Vec3f hue_colour(double hue, double saturation, double value) {
 
 cv::Mat paint_wood(cv::Size size, const cv::Vec3f& tone, int boards, std::uint32_t seed) {
   const float board_px = static_cast<float>(size.height) / static_cast<float>(boards);
-  return paint(size, [&](int x, int y) -> cv::Vec3f {
+  struct Piece {
+    int board = -1, number = -1;
+    std::uint32_t seed = 0;
+    float light = 0, warm = 0;
+  } piece;  // of the pixel before: most pixels share it
+  return paint(size, [&, piece](int x, int y) mutable -> cv::Vec3f {
     const int board = static_cast<int>(static_cast<float>(y) / board_px);
     const float across = static_cast<float>(y) - static_cast<float>(board) * board_px;
     // Boards are staggered pieces of unequal length.
     const float start = lattice_hash(board, 7, seed) * static_cast<float>(size.width);
     const float piece_px = board_px * (5.f + 6.f * lattice_hash(board, 3, seed));
     const float run = static_cast<float>(x) + start;
-    const int piece = boards > 1 ? static_cast<int>(run / piece_px) : 0;
-    const float along = boards > 1 ? run - static_cast<float>(piece) * piece_px : run;
-    const std::uint32_t own = seed + static_cast<std::uint32_t>(board * 131 + piece * 7919);
-    const float warp = fractal_noise(along * 0.006f, across * 0.02f + 11.f, own, 4096, 2);
-    const float rings = across * 0.05f + warp * 7.f;
-    const float grain = 0.5f + 0.5f * std::sin(rings * 6.2832f * 0.55f + 2.f * warp);
-    const float fibre = fractal_noise(along * 0.03f, across * 0.9f, own + 1, 4096, 2);
-    const float pores = value_noise(along * 0.08f, across * 1.3f, own + 2, 4096) > 0.86f ? 0.82f : 1.f;
-    float light = 0.78f + 0.30f * lattice_hash(board, piece, seed + 5) - 0.20f * grain * grain + 0.28f * (fibre - 0.5f);
-    light *= pores;
-    const float knot = value_noise(along * 0.016f, across * 0.055f, own + 3, 4096);
+    const int number = boards > 1 ? static_cast<int>(run / piece_px) : 0;
+    const float along = boards > 1 ? run - static_cast<float>(number) * piece_px : run;
+    if (board != piece.board || number != piece.number) {
+      piece = {board, number, seed + static_cast<std::uint32_t>(board * 131 + number * 7919),
+               0.78f + 0.30f * lattice_hash(board, number, seed + 5), lattice_hash(board, number, seed + 6) - 0.5f};
+    }
+    const float warp = fractal_noise(along * 0.006f, across * 0.02f + 11.f, piece.seed, 4096, 2);
+    const float ring = (across * 0.05f + warp * 7.f) * 0.55f + 0.3f * warp;
+    const float grain = smooth_step(0.f, 1.f, std::abs(2.f * (ring - std::floor(ring)) - 1.f));
+    const float fibre = fractal_noise(along * 0.03f, across * 0.9f, piece.seed + 1, 4096, 2);
+    float light = piece.light - 0.20f * grain * grain + 0.28f * (fibre - 0.5f);
+    if (value_noise(along * 0.08f, across * 1.3f, piece.seed + 2, 4096) > 0.86f) light *= 0.82f;  // pores
+    const float knot = value_noise(along * 0.016f, across * 0.055f, piece.seed + 3, 4096);
     if (knot > 0.88f) light *= 1.f - 3.2f * (knot - 0.88f);
     if (boards > 1) {
       const float gap = std::min({across, board_px - across, along, piece_px - along});
       light *= 0.45f + 0.55f * smooth_step(0.f, 1.8f, gap);
     }
-    const float scratch = fractal_noise(static_cast<float>(x) * 0.01f, static_cast<float>(y) * 0.01f, seed + 9, 4096, 2);
-    light *= 0.9f + 0.2f * scratch;
-    const float warm = lattice_hash(board, piece, seed + 6) - 0.5f;
-    return {tone[0] * light * (1.f - 0.12f * warm), tone[1] * light, tone[2] * light * (1.f + 0.06f * warm)};
+    light *= 0.9f + 0.2f * value_noise(static_cast<float>(x) * 0.012f, static_cast<float>(y) * 0.012f, seed + 9, 4096);
+    return {tone[0] * light * (1.f - 0.12f * piece.warm), tone[1] * light, tone[2] * light * (1.f + 0.06f * piece.warm)};
   });
 }
 
 cv::Mat paint_plaster(cv::Size size, const cv::Vec3f& tone, float roughness, std::uint32_t seed) {
-  return paint(size, [&](int x, int y) -> cv::Vec3f {
+  constexpr int kCoarse = 8;  // clouds and stains are smooth: painted small, then enlarged
+  cv::Mat broad(size.height / kCoarse, size.width / kCoarse, CV_32FC1), smooth;
+  for (int y = 0; y < broad.rows; ++y) {
+    for (int x = 0; x < broad.cols; ++x) {
+      const float fx = (static_cast<float>(x) + 0.5f) * kCoarse, fy = (static_cast<float>(y) + 0.5f) * kCoarse;
+      const float clouds = fractal_noise(fx * 0.006f, fy * 0.006f, seed, 4096, 4) - 0.5f;
+      const float stain = fractal_noise(fx * 0.02f, fy * 0.008f, seed + 21, 4096, 4);
+      broad.at<float>(y, x) = 0.25f * clouds - 0.9f * std::max(0.f, stain - 0.66f);
+    }
+  }
+  cv::resize(broad, smooth, size, 0, 0, cv::INTER_CUBIC);
+  std::vector<float> above(size.width, 0.5f);  // relief of the row before: light falls from above
+  return paint(size, [&, above](int x, int y) mutable -> cv::Vec3f {
     const float fx = static_cast<float>(x), fy = static_cast<float>(y);
-    const float clouds = fractal_noise(fx * 0.006f, fy * 0.006f, seed, 4096, 4) - 0.5f;
-    const float stain = fractal_noise(fx * 0.02f, fy * 0.008f, seed + 21, 4096, 4);
-    // Relief lit from above: difference of two heights.
-    const float relief = fractal_noise(fx * 0.11f, fy * 0.11f, seed + 4, 4096, 3) -
-                         fractal_noise(fx * 0.11f + 0.03f, (fy - 1.f) * 0.11f, seed + 4, 4096, 3);
+    const float relief = fractal_noise(fx * 0.11f, fy * 0.11f, seed + 4, 4096, 3);
+    const float slope = relief - above[x];
+    above[x] = relief;
     const float speck = value_noise(fx * 0.35f, fy * 0.35f, seed + 5, 4096);
-    float light = 1.f + roughness * (0.25f * clouds + 0.9f * relief);
-    if (stain > 0.66f) light -= roughness * 0.9f * (stain - 0.66f);
+    float light = 1.f + roughness * (smooth.at<float>(y, x) + 0.9f * slope);
     if (speck > 0.955f) light -= roughness * 0.35f;
     if (speck < 0.03f) light += roughness * 0.12f;
     return tone * light;

@@ -44,10 +44,10 @@ std::array<Vector2f, 3> chart(const BodyPart& part, const std::array<Vector3f, 3
 /// How open a point of the surface is: distances ahead that come out shorter than straight ones (after Evans 2006).
 float openness(const std::vector<BodyPart>& parts, const Vector3f& p, const Vector3f& normal) {
   float closed = 0;
-  for (const float ahead : {0.03f, 0.07f, 0.14f}) {
+  for (const float ahead : {0.035f, 0.12f}) {
     float nearest = ahead;
     for (const BodyPart& part : parts) nearest = std::min(nearest, part.shape.value(p + ahead * normal));
-    closed += 0.45f * std::max(0.f, ahead - nearest) / ahead;
+    closed += 0.62f * std::max(0.f, ahead - nearest) / ahead;
   }
   return std::clamp(1.f - closed, 0.25f, 1.f);
 }

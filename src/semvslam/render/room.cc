@@ -149,6 +149,15 @@ void furnish_a(Furnisher& f) {
   f.whiteboard(on_plan(-1.0, n, 1.12), 1.7, 1.05);
   f.plant(on_plan(3.3, so + 0.28), 1.25);
   f.poster(on_plan(2.85, n, 1.35), 0.6, 0.85);
+  f.curtain(on_plan(0.2, n - 0.06, 0.25), 0.34, 2.15);
+  f.curtain(on_plan(2.2, n - 0.06, 0.25), 0.34, 2.15);
+  f.carton(on_plan(2.7, n - 0.22), {0.45, 0.34, 0.32});
+  f.book_stack(on_plan(2.7, n - 0.22, 0.32), 4);
+  f.bin(on_plan(0.02, n - 0.22));
+  f.bin(on_plan(w + 0.2, 2.6));
+  for (const double y : {-2.6, 0.75, 2.3}) f.wall_plate(on_plan(w, y, 0.3, 90));
+  for (const double x : {-2.1, 0.15, 2.5}) f.wall_plate(on_plan(x, n, x > 2 ? 1.1 : 0.3));
+  for (const double y : {-1.5, 1.75}) f.wall_plate(on_plan(e, y, 1.1, -90));
   f.poster(on_plan(w, 0.1, 1.1, 90), 0.8, 1.1);
   f.poster(on_plan(w, -1.2, 1.3, 90), 0.6, 0.45);
   f.poster(on_plan(w, 1.5, 1.2, 90), 1.0, 0.7);
@@ -183,6 +192,9 @@ void furnish_b(Furnisher& f) {
   f.poster(on_plan(6.7, so, 1.2, 180), 0.7, 1.0);
   f.bookshelf(on_plan(w + 0.17, -0.6, 0, 90), 1.5, 1.95, 0.3, 5);
   f.poster(on_plan(w, 0.7, 1.2, 90), 0.9, 0.9);
+  f.wall_plate(on_plan(w, -1.5, 1.1, 90));
+  f.wall_plate(on_plan(4.75, n, 0.3));
+  f.bin(on_plan(4.3, n - 0.25));
   f.carton(on_plan(6.9, -2.8, 0, 15), {0.5, 0.4, 0.4});
   f.carton(on_plan(6.9, -2.82, 0.4, -10), {0.4, 0.35, 0.3});
 }

@@ -74,7 +74,10 @@ Colour4 Texture::sample(float u, float v, float lod) const {
   if (lod <= 0.f) return bilinear(levels_[0], u, v);
   const int level = static_cast<int>(lod);
   if (level >= last) return unpack(levels_[last].texels[0]);
-  const float blend = lod - static_cast<float>(level);
+  // Blends only in the middle half between two levels: as smooth to the eye, and half of the pixels read one level.
+  const float blend = 2.f * (lod - static_cast<float>(level)) - 0.5f;
+  if (blend <= 0.f) return bilinear(levels_[level], u, v);
+  if (blend >= 1.f) return bilinear(levels_[level + 1], u, v);
   return bilinear(levels_[level], u, v) * (1.f - blend) + bilinear(levels_[level + 1], u, v) * blend;
 }
 
