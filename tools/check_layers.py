@@ -37,6 +37,7 @@ ALLOWED = {
 FOREIGN = {
     "OpenCV": (re.compile(r"opencv2/"), {"data", "feature", "render", "motion", "semantic", "dynamic", "tracking", "map"}),
     "Ceres": (re.compile(r"ceres/"), {"solve"}),
+    "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),
     "CLI11": (re.compile(r"CLI/"), {"apps"}),
     "nlohmann-json": (re.compile(r"nlohmann/"), {"apps", "eval", "semantic"}),

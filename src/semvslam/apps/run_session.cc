@@ -72,8 +72,8 @@ class Pace {
 
   /// Waits until `stamp` is due. @return false when the next frame is due already: this one should be dropped.
   bool keep(TimeStamp stamp) {
-    if (!first_) first_ = stamp, start_ = Clock::now();
-    const double due_s = static_cast<double>(stamp.ns - first_->ns) * 1e-9;
+    if (!started_) started_ = true, first_ = stamp, start_ = Clock::now();
+    const double due_s = static_cast<double>(stamp.ns - first_.ns) * 1e-9;
     if (seconds_since(start_) > due_s + period_s_) return false;
     std::this_thread::sleep_until(start_ +
                                   std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(due_s)));
@@ -82,7 +82,8 @@ class Pace {
 
  private:
   const double period_s_;
-  std::optional<TimeStamp> first_;
+  bool started_ = false;
+  TimeStamp first_;
   Clock::time_point start_;
 };
 
