@@ -8,6 +8,8 @@
 namespace semvslam {
 namespace {
 
+constexpr double kUndistortedSquared = 1e-20;  // of the error on the plane z = 1: below 1e-7 px
+
 Eigen::Vector2d apply(const BrownDistortion& d, const Eigen::Vector2d& n) {
   const double x = n.x(), y = n.y();
   const double r2 = x * x + y * y;
@@ -40,16 +42,15 @@ Eigen::Vector2d Camera::distort(const Eigen::Vector2d& ideal) const {
 Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& recorded) const {
   if (distortion.is_zero()) return recorded;
   const Eigen::Vector2d target((recorded.x() - cx_px) / fx_px, (recorded.y() - cy_px) / fy_px);
-  Eigen::Vector2d n = target;
-  double error = (target - apply(distortion, n)).squaredNorm();
-  for (int i = 0; i < 20 && error > 1e-24; ++i) {
-    Eigen::Vector2d step = derivative(distortion, n).inverse() * (target - apply(distortion, n));
-    double next_error = (target - apply(distortion, n + step)).squaredNorm();
-    while (!(next_error < error) && step.squaredNorm() > 1e-26) {
+  Eigen::Vector2d n = target, error = target - apply(distortion, n);
+  for (int i = 0; i < 20 && error.squaredNorm() > kUndistortedSquared; ++i) {
+    Eigen::Vector2d step = derivative(distortion, n).inverse() * error;
+    Eigen::Vector2d next_error = target - apply(distortion, n + step);
+    while (!(next_error.squaredNorm() < error.squaredNorm()) && step.squaredNorm() > kUndistortedSquared) {
       step *= 0.5;
-      next_error = (target - apply(distortion, n + step)).squaredNorm();
+      next_error = target - apply(distortion, n + step);
     }
-    if (!(next_error < error)) break;
+    if (!(next_error.squaredNorm() < error.squaredNorm())) break;
     n += step;
     error = next_error;
   }

@@ -8,7 +8,7 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double kSeriesBelow_rad = 0.05;  // the closed forms lose digits to cancellation below
+constexpr double kSeriesBelowRad = 0.05;  // the closed forms lose digits to cancellation below
 
 struct Blocks {
   Eigen::Matrix3d rotation;  // left Jacobian of SO(3)
@@ -23,7 +23,7 @@ Blocks blocks(const SE3::Tangent& xi) {
   double b = 1.0 / 6 - t2 / 120 + t2 * t2 / 5040;    // (t - sin t) / t^3
   double c = 1.0 / 24 - t2 / 720 + t2 * t2 / 40320;  // (t^2 / 2 + cos t - 1) / t^4
   double d = 1.0 / 120 - t2 / 2520;                  // (2 t - 3 sin t + t cos t) / (2 t^5)
-  if (t > kSeriesBelow_rad) {
+  if (t > kSeriesBelowRad) {
     const double s = std::sin(t), k = std::cos(t);
     a = (1 - k) / t2;
     b = (t - s) / (t2 * t);

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "semvslam/solve/bundle_adjustment.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "semvslam/base/random.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

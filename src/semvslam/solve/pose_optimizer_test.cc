@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "semvslam/solve/residuals.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

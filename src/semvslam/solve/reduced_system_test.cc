@@ -6,7 +6,7 @@
 
 #include "semvslam/base/random.h"
 #include "semvslam/solve/bundle_adjustment.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

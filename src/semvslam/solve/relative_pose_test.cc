@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "semvslam/base/random.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

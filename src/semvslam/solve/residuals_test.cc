@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "semvslam/solve/lanes.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {

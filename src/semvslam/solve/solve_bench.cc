@@ -5,7 +5,7 @@
 #include "semvslam/solve/pnp.h"
 #include "semvslam/solve/pose_graph.h"
 #include "semvslam/solve/pose_optimizer.h"
-#include "semvslam/solve/synthetic_bundle.h"
+#include "semvslam/solve/synthetic_test_scenes.h"
 
 namespace semvslam {
 namespace {
