@@ -81,26 +81,36 @@ def write_onnx(net, out, size):
             ("mask", Mask(net), torch.zeros(4, 14, 14, c), "rois", ["masks"], {"rois": {0: "n"}, "masks": {0: "n"}}))
     for name, m, x, given, outs, dyn in jobs:
         torch.onnx.export(m.eval(), (x,), os.path.join(out, name + ".onnx"), input_names=[given], output_names=outs, dynamic_axes=dyn,
-                          opset_version=17, dynamo=False)
-        halve(os.path.join(out, name + ".onnx"))
+                          opset_version=10, dynamo=False)
+        bake_padding(os.path.join(out, name + ".onnx"))
 
 
-def halve(path):
-    """Weights as float16 with a cast behind each: half the file, the same network but for the rounding of the weights."""
+def bake_padding(path):
+    """Padding before a convolution becomes the convolution's own, and what is not needed any more goes.
+
+    The exporter computes the amounts with a chain of nodes, which simpler runtimes cannot follow.
+    """
     import onnx
     m = onnx.load(path)
-    casts, kept = [], []
-    for t in m.graph.initializer:
-        a = onnx.numpy_helper.to_array(t)
-        if a.dtype != np.float32 or a.size < 512:
-            kept.append(t)
+    nodes = list(m.graph.node)
+    maker = {o: n for n in nodes for o in n.output}
+    for n in nodes:
+        before = maker.get(n.input[0]) if n.op_type == "Conv" else None
+        if before is None or before.op_type != "Pad":
             continue
-        kept.append(onnx.numpy_helper.from_array(a.astype(np.float16), t.name + "_half"))
-        casts.append(onnx.helper.make_node("Cast", [t.name + "_half"], [t.name], to=onnx.TensorProto.FLOAT))
-    nodes = casts + list(m.graph.node)
-    del m.graph.initializer[:], m.graph.node[:]
-    m.graph.initializer.extend(kept)
-    m.graph.node.extend(nodes)
+        attribute = next(a for a in n.attribute if a.name == "pads")
+        kernel = next(a for a in n.attribute if a.name == "kernel_shape").ints
+        if list(attribute.ints) != [0, 0, 0, 0]:
+            raise ValueError(f"{n.name}: padded twice")
+        attribute.ints[:] = [0, 0, kernel[0] // 2, kernel[1] // 2]          # see backbones.SameConv
+        n.input[0] = before.input[0]
+    needed, kept = {o.name for o in m.graph.output}, []
+    for n in reversed(nodes):
+        if needed & set(n.output):
+            kept.append(n)
+            needed |= set(n.input)
+    del m.graph.node[:]
+    m.graph.node.extend(reversed(kept))
     onnx.checker.check_model(m)
     onnx.save(m, path)
 

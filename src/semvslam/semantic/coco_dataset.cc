@@ -20,7 +20,8 @@ std::vector<Point> fine_outline(const std::vector<double>& polygon, double scale
   const std::size_t n = polygon.size() / 2;
   std::vector<Point> corners;
   for (std::size_t i = 0; i < n; ++i)
-    corners.push_back({static_cast<int>(scale * polygon[2 * i] + .5), static_cast<int>(scale * polygon[2 * i + 1] + .5)});
+    corners.push_back(
+        {static_cast<int>(scale * polygon[2 * i] + .5), static_cast<int>(scale * polygon[2 * i + 1] + .5)});
   corners.push_back(corners[0]);
   std::vector<Point> out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -29,10 +30,13 @@ std::vector<Point> fine_outline(const std::vector<double>& polygon, double scale
     const bool flip = (dx >= dy && a.x > b.x) || (dx < dy && a.y > b.y);
     if (flip) std::swap(a, b);
     const int steps = std::max(dx, dy);
-    const double slope = steps == 0 ? 0 : dx >= dy ? static_cast<double>(b.y - a.y) / dx : static_cast<double>(b.x - a.x) / dy;
+    const double slope = steps == 0 ? 0
+                         : dx >= dy ? static_cast<double>(b.y - a.y) / dx
+                                    : static_cast<double>(b.x - a.x) / dy;
     for (int d = 0; d <= steps; ++d) {
       const int t = flip ? steps - d : d;
-      out.push_back(dx >= dy ? Point{t + a.x, static_cast<int>(a.y + slope * t + .5)} : Point{static_cast<int>(a.x + slope * t + .5), t + a.y});
+      out.push_back(dx >= dy ? Point{t + a.x, static_cast<int>(a.y + slope * t + .5)}
+                             : Point{static_cast<int>(a.x + slope * t + .5), t + a.y});
     }
   }
   return out;
@@ -56,10 +60,12 @@ void fill(const std::vector<double>& polygon, cv::Mat& mask) {
   }
   std::sort(flips.begin(), flips.end());
   for (std::size_t i = 0; i + 1 < flips.size(); i += 2)
-    for (std::size_t at = flips[i]; at < flips[i + 1]; ++at) mask.at<std::uint8_t>(static_cast<int>(at % height), static_cast<int>(at / height)) = 255;
+    for (std::size_t at = flips[i]; at < flips[i + 1]; ++at)
+      mask.at<std::uint8_t>(static_cast<int>(at % height), static_cast<int>(at / height)) = 255;
 }
 
-/// COCO's compressed run lengths: six bits a character, each run from the third on as a difference to the one before last.
+/// COCO's compressed run lengths: six bits a character, each run from the third on as a difference to the one before
+/// last.
 std::vector<std::uint32_t> unpack_runs(const std::string& text) {
   std::vector<std::uint32_t> out;
   for (std::size_t p = 0; p < text.size();) {
@@ -108,7 +114,8 @@ cv::Mat CocoObject::mask(cv::Size size) const {
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const std::size_t until = std::min<std::size_t>(end, at + runs[i]);
     if (i % 2 == 1)
-      for (std::size_t k = at; k < until; ++k) out.at<std::uint8_t>(static_cast<int>(k % height), static_cast<int>(k / height)) = 255;
+      for (std::size_t k = at; k < until; ++k)
+        out.at<std::uint8_t>(static_cast<int>(k % height), static_cast<int>(k / height)) = 255;
     at = until;
   }
   return out;
@@ -123,9 +130,11 @@ Result<CocoDataset> CocoDataset::read(const std::filesystem::path& json) {
     std::map<std::int64_t, std::size_t> index;
     for (const nlohmann::json& i : root.at("images")) {
       index[i.at("id").get<std::int64_t>()] = out.images.size();
-      out.images.push_back({i.at("file_name").get<std::string>(), {i.at("width").get<int>(), i.at("height").get<int>()}, {}});
+      out.images.push_back(
+          {i.at("file_name").get<std::string>(), {i.at("width").get<int>(), i.at("height").get<int>()}, {}});
     }
-    for (const nlohmann::json& c : root.at("categories")) out.categories[c.at("id").get<int>()] = c.at("name").get<std::string>();
+    for (const nlohmann::json& c : root.at("categories"))
+      out.categories[c.at("id").get<int>()] = c.at("name").get<std::string>();
     for (const nlohmann::json& a : root.at("annotations")) {
       const auto at = index.find(a.at("image_id").get<std::int64_t>());
       if (at == index.end()) throw std::invalid_argument("an annotation of an image that is not listed");

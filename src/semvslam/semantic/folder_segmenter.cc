@@ -20,7 +20,9 @@ constexpr std::int64_t kLargestGapNs = 20'000'000;
 std::optional<TimeStamp> stamp_of(const std::string& stem) {
   const std::size_t point = stem.find('.');
   const std::string whole = stem.substr(0, point), part = point == std::string::npos ? "" : stem.substr(point + 1);
-  const auto digits = [](const std::string& s) { return std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; }); };
+  const auto digits = [](const std::string& s) {
+    return std::all_of(s.begin(), s.end(), [](char c) { return c >= '0' && c <= '9'; });
+  };
   if (whole.empty() || whole.size() > 10 || part.size() > 9 || !digits(whole) || !digits(part)) return std::nullopt;
   std::int64_t ns = std::atoll(whole.c_str()) * 1'000'000'000;
   if (!part.empty()) ns += std::atoll((part + std::string(9 - part.size(), '0')).c_str());
@@ -31,7 +33,8 @@ std::optional<TimeStamp> stamp_of(const std::string& stem) {
 
 Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder, const RoleTable& roles) {
   std::error_code ec;
-  if (!fs::is_directory(folder, ec)) return Error{ErrorCode::kNotFound, fmt::format("{}: no such folder of masks", folder.string())};
+  if (!fs::is_directory(folder, ec))
+    return Error{ErrorCode::kNotFound, fmt::format("{}: no such folder of masks", folder.string())};
   auto out = std::unique_ptr<FolderSegmenter>(new FolderSegmenter);
   out->folder_ = folder;
   out->roles_ = roles;
@@ -64,7 +67,9 @@ Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder,
 }
 
 const fs::path* FolderSegmenter::find(const SegmentationRequest& request) const {
-  if (const auto it = by_name_.find(fs::path(request.name).stem().string()); !request.name.empty() && it != by_name_.end()) return &it->second;
+  if (const auto it = by_name_.find(fs::path(request.name).stem().string());
+      !request.name.empty() && it != by_name_.end())
+    return &it->second;
   const fs::path* best = nullptr;
   std::int64_t gap = kLargestGapNs + 1;
   const auto consider = [&](auto it) {
@@ -85,11 +90,14 @@ Result<Segmentation> FolderSegmenter::segment(const SegmentationRequest& request
   const fs::path* file = find(request);
   if (!file) return out;
   cv::Mat labels = cv::imread(file->string(), cv::IMREAD_UNCHANGED);
-  const auto wrong = [&](const std::string& what) { return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file->string(), what)}; };
+  const auto wrong = [&](const std::string& what) {
+    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file->string(), what)};
+  };
   if (labels.empty()) return wrong("is no readable PNG");
   if (labels.type() != CV_8UC1 && labels.type() != CV_16UC1) return wrong("a mask has one channel of 8 or 16 bits");
   if (labels.size() != request.image.size())
-    return wrong(fmt::format("is {}x{}, the image {}x{}", labels.cols, labels.rows, request.image.cols, request.image.rows));
+    return wrong(
+        fmt::format("is {}x{}, the image {}x{}", labels.cols, labels.rows, request.image.cols, request.image.rows));
   labels.convertTo(labels, CV_16U);
 
   std::map<int, cv::Rect> windows;
@@ -109,7 +117,9 @@ Result<Segmentation> FolderSegmenter::segment(const SegmentationRequest& request
     i.id = InstanceId(static_cast<std::uint32_t>(out.instances.size()));
     const auto named = class_of_number_.find(number);
     i.class_index = named == class_of_number_.end() ? 0 : named->second;
-    i.class_name = named == class_of_number_.end() && !class_of_number_.empty() ? "unknown" : names_[static_cast<std::size_t>(i.class_index)];
+    i.class_name = named == class_of_number_.end() && !class_of_number_.empty()
+                       ? "unknown"
+                       : names_[static_cast<std::size_t>(i.class_index)];
     i.role = roles_.role(i.class_name);
     i.score = 1.f;
     i.box = cv::Rect2f(window);
@@ -120,6 +130,8 @@ Result<Segmentation> FolderSegmenter::segment(const SegmentationRequest& request
   return out;
 }
 
-std::string FolderSegmenter::description() const { return fmt::format("{} masks in {}", by_name_.size(), folder_.string()); }
+std::string FolderSegmenter::description() const {
+  return fmt::format("{} masks in {}", by_name_.size(), folder_.string());
+}
 
 }  // namespace semvslam

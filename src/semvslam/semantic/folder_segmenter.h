@@ -26,9 +26,9 @@ class FolderSegmenter final : public Segmenter {
   const std::filesystem::path* find(const SegmentationRequest& request) const;
 
   std::filesystem::path folder_;
-  std::map<std::string, std::filesystem::path> by_name_;           // file name without extension
-  std::map<TimeStamp, std::filesystem::path> by_stamp_;            // where the name is a number of seconds
-  std::map<int, int> class_of_number_;                             // into names_
+  std::map<std::string, std::filesystem::path> by_name_;  // file name without extension
+  std::map<TimeStamp, std::filesystem::path> by_stamp_;   // where the name is a number of seconds
+  std::map<int, int> class_of_number_;                    // into names_
   std::vector<std::string> names_;
   RoleTable roles_;
 };

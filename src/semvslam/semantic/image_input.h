@@ -11,7 +11,7 @@ Result<cv::Mat> to_bgr8(const cv::Mat& image);
 
 /// An image fitted into a network's input: at the top left, the rest filled with `pad`.
 struct FittedImage {
-  cv::Mat image;             // CV_8UC3, continuous
+  cv::Mat image;                   // CV_8UC3, continuous
   float scale_x = 1, scale_y = 1;  // input pixels per image pixel
 };
 

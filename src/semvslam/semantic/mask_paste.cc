@@ -30,7 +30,8 @@ Axis make_axis(int first, int end, float low, float high, int side) {
 }  // namespace
 
 PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& box, cv::Size image) {
-  const int x0 = std::max(0, static_cast<int>(std::floor(box.x0))), y0 = std::max(0, static_cast<int>(std::floor(box.y0)));
+  const int x0 = std::max(0, static_cast<int>(std::floor(box.x0))),
+            y0 = std::max(0, static_cast<int>(std::floor(box.y0)));
   const int x1 = std::min(image.width, static_cast<int>(std::ceil(box.x1)));
   const int y1 = std::min(image.height, static_cast<int>(std::ceil(box.y1)));
   if (x1 <= x0 || y1 <= y0) return {};
@@ -38,7 +39,8 @@ PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& 
   const int padded = side + 2;
   std::vector<float> grid(static_cast<std::size_t>(padded) * padded, 0.f);
   for (int y = 0; y < side; ++y)
-    std::copy_n(probabilities + static_cast<std::ptrdiff_t>(y) * side, side, &grid[static_cast<std::size_t>((y + 1) * padded + 1)]);
+    std::copy_n(probabilities + static_cast<std::ptrdiff_t>(y) * side, side,
+                &grid[static_cast<std::size_t>((y + 1) * padded + 1)]);
 
   const Axis xs = make_axis(x0, x1, box.x0, box.x1, side), ys = make_axis(y0, y1, box.y0, box.y1, side);
   PastedMask out{cv::Rect(x0, y0, x1 - x0, y1 - y0), cv::Mat(y1 - y0, x1 - x0, CV_8UC1)};

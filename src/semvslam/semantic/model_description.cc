@@ -39,15 +39,19 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.box_levels = j.at("box_levels").get<std::vector<float>>();
   m.mask_levels = j.at("mask_levels").get<std::vector<float>>();
   m.channels = j.at("feature_channels").get<int>();
-  check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096, "'input' is no usable size");
+  check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096,
+        "'input' is no usable size");
   check(!m.classes.empty(), "'classes' is empty");
   check(m.channels > 0 && m.channels <= 4096, "'feature_channels' is out of range");
   check(!m.anchor_ratios.empty() && !m.anchor_sizes[0].empty(), "no anchors");
-  for (const auto& sizes : m.anchor_sizes) check(sizes.size() == m.anchor_sizes[0].size(), "'anchor_sizes' differ in length");
+  for (const auto& sizes : m.anchor_sizes)
+    check(sizes.size() == m.anchor_sizes[0].size(), "'anchor_sizes' differ in length");
   for (const float r : m.anchor_ratios) check(r > 0, "'anchor_ratios' must be positive");
   for (const float w : m.box_weights) check(w > 0, "'box_weights' must be positive");
-  for (const int s : m.strides) check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
-  check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels, "too many level thresholds");
+  for (const int s : m.strides)
+    check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
+  check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels,
+        "too many level thresholds");
 }
 
 }  // namespace
@@ -57,7 +61,8 @@ Result<ModelDescription> ModelDescription::read(const std::filesystem::path& fol
   std::ifstream stream(file);
   if (!stream)
     return Error{ErrorCode::kNotFound, fmt::format("{}: cannot be opened; a model is a folder with this file and the "
-                                                   "network's graphs (training/export.py writes it)", file.string())};
+                                                   "network's graphs (training/export.py writes it)",
+                                                   file.string())};
   ModelDescription m;
   try {
     fill(m, nlohmann::json::parse(stream));
@@ -66,7 +71,8 @@ Result<ModelDescription> ModelDescription::read(const std::filesystem::path& fol
   }
   for (const std::string& name : {m.trunk, m.box, m.mask})
     if (!std::filesystem::is_regular_file(folder / name))
-      return Error{ErrorCode::kNotFound, fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};
+      return Error{ErrorCode::kNotFound,
+                   fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};
   return m;
 }
 

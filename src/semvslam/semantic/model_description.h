@@ -16,7 +16,7 @@ struct ModelDescription {
 
   std::string name, trunk, box, mask;  // files beside model.json
   cv::Size input;
-  int pad = 127;                       // value of the pixels that the image does not cover
+  int pad = 127;  // value of the pixels that the image does not cover
   std::vector<std::string> classes;
   std::array<int, kLevels> strides{};
   std::array<std::vector<float>, kLevels> anchor_sizes;

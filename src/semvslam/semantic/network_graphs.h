@@ -48,10 +48,12 @@ class NetworkGraphs {
 /// Errors: a graph that cannot be read, or whose inputs and outputs differ from the description (the message names the
 /// tensor), or a build without OpenVINO (kUnsupported).
 /// @param precision "auto" (the fastest type of the machine) or "f32".
-Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder, const ModelDescription& model,
-                                                            const std::string& precision, int threads);
+Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
+                                                            const ModelDescription& model, const std::string& precision,
+                                                            int threads);
 /// The same by OpenCV's DNN module: slower, reads ONNX graphs only.
-Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder, const ModelDescription& model);
+Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder,
+                                                          const ModelDescription& model);
 bool have_openvino();
 
 }  // namespace semvslam

@@ -21,13 +21,16 @@ Error not_finite(const char* what) {
 
 }  // namespace
 
-NetworkSegmenter::NetworkSegmenter(std::unique_ptr<NetworkGraphs> graphs, ModelDescription model, Limits limits, RoleTable roles,
-                                   StageTimers* timers)
-    : graphs_(std::move(graphs)), model_(std::move(model)), limits_(limits), roles_(std::move(roles)),
+NetworkSegmenter::NetworkSegmenter(std::unique_ptr<NetworkGraphs> graphs, ModelDescription model, Limits limits,
+                                   RoleTable roles, StageTimers* timers)
+    : graphs_(std::move(graphs)),
+      model_(std::move(model)),
+      limits_(limits),
+      roles_(std::move(roles)),
       timers_(timers ? *timers : own_timers_) {
   for (std::size_t l = 0; l < anchors_.size(); ++l)
-    anchors_[l] = make_anchors(model_.input.height / model_.strides[l], model_.input.width / model_.strides[l], model_.strides[l],
-                               model_.anchor_sizes[l], model_.anchor_ratios);
+    anchors_[l] = make_anchors(model_.input.height / model_.strides[l], model_.input.width / model_.strides[l],
+                               model_.strides[l], model_.anchor_sizes[l], model_.anchor_ratios);
 }
 
 Result<Segmentation> NetworkSegmenter::segment(const SegmentationRequest& request) {
@@ -69,12 +72,13 @@ Result<std::vector<DetectionBox>> NetworkSegmenter::propose(const TrunkOutput& t
     }
   }
   std::vector<DetectionBox> out;
-  for (const int i : suppress_overlaps(boxes, scores, limits_.proposal_overlap, NetworkGraphs::kBoxBatch)) out.push_back(boxes[i]);
+  for (const int i : suppress_overlaps(boxes, scores, limits_.proposal_overlap, NetworkGraphs::kBoxBatch))
+    out.push_back(boxes[i]);
   return out;
 }
 
-void NetworkSegmenter::align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,
-                                    float* to) const {
+void NetworkSegmenter::align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels,
+                                    int cells, float* to) const {
   roi_align(trunk[roi_level(box, levels)].features, model_.channels, box, cells, to);
 }
 
@@ -91,16 +95,19 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
   const Result<BoxHeadOutput> head = graphs_->box_head();
   if (!head) return head.error();
   const std::size_t classes = model_.classes.size();
-  const auto used_p = head->probabilities.first(proposals.size() * (classes + 1)), used_d = head->deltas.first(proposals.size() * 4);
+  const auto used_p = head->probabilities.first(proposals.size() * (classes + 1)),
+             used_d = head->deltas.first(proposals.size() * 4);
   if (!finite(used_p) || !finite(used_d)) return not_finite("classes or boxes");
 
   std::vector<std::vector<Object>> by_class(classes);
   for (std::size_t n = 0; n < proposals.size(); ++n) {
-    const DetectionBox box = decode_box(&used_d[n * 4], proposals[n], model_.box_weights, static_cast<float>(model_.input.width),
-                                        static_cast<float>(model_.input.height));
+    const DetectionBox box =
+        decode_box(&used_d[n * 4], proposals[n], model_.box_weights, static_cast<float>(model_.input.width),
+                   static_cast<float>(model_.input.height));
     if (box.width() < kLeastObjectSide || box.height() < kLeastObjectSide) continue;
     for (std::size_t c = 0; c < classes; ++c)
-      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= limits_.score) by_class[c].push_back({box, static_cast<int>(c), p});
+      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= limits_.score)
+        by_class[c].push_back({box, static_cast<int>(c), p});
   }
   for (const std::vector<Object>& candidates : by_class) {
     std::vector<DetectionBox> boxes;
@@ -109,14 +116,16 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
       boxes.push_back(o.box);
       scores.push_back(o.score);
     }
-    for (const int i : suppress_overlaps(boxes, scores, limits_.object_overlap, limits_.objects)) found.push_back(candidates[i]);
+    for (const int i : suppress_overlaps(boxes, scores, limits_.object_overlap, limits_.objects))
+      found.push_back(candidates[i]);
   }
   std::stable_sort(found.begin(), found.end(), [](const Object& a, const Object& b) { return a.score > b.score; });
   if (std::ssize(found) > limits_.objects) found.resize(static_cast<std::size_t>(limits_.objects));
   return found;
 }
 
-Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y, Segmentation& out) {
+Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x,
+                              float scale_y, Segmentation& out) {
   const auto lap = timers_["segment.masks"].time();
   const auto width = static_cast<float>(out.size.width), height = static_cast<float>(out.size.height);
   const std::span<float> input = graphs_->mask_input();
@@ -132,7 +141,8 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
     for (std::size_t k = 0; k < n; ++k) {
       const Object& o = objects[first + k];
       const std::size_t channel = o.class_index == 0 ? 0 : 1;  // persons have a channel of their own
-      const std::span<const float> mask = masks->subspan((k * NetworkGraphs::kMaskChannels + channel) * kPixels, kPixels);
+      const std::span<const float> mask =
+          masks->subspan((k * NetworkGraphs::kMaskChannels + channel) * kPixels, kPixels);
       if (!finite(mask)) return not_finite("masks");
       const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
                              std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};

@@ -16,7 +16,7 @@ class NetworkSegmenter final : public Segmenter {
     float proposal_overlap = 0.7f;  // IoU above which the weaker of two proposals goes
     float object_overlap = 0.5f;    // the same of objects of one class
     int objects = 50;
-    float score = 0.5f;             // least score of an object
+    float score = 0.5f;  // least score of an object
   };
 
   /// @param timers may be null; gets segment.prepare, .trunk, .proposals, .boxes, .masks. Must outlive this object.
@@ -35,8 +35,10 @@ class NetworkSegmenter final : public Segmenter {
   };
   Result<std::vector<DetectionBox>> propose(const TrunkOutput& trunk) const;
   Result<std::vector<Object>> classify(const TrunkOutput& trunk, const std::vector<DetectionBox>& proposals);
-  Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y, Segmentation& out);
-  void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells, float* to) const;
+  Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y,
+              Segmentation& out);
+  void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,
+                    float* to) const;
 
   std::unique_ptr<NetworkGraphs> graphs_;
   const ModelDescription model_;

@@ -72,7 +72,8 @@ struct Fake {
   Fake() {
     auto owned = std::make_unique<FakeGraphs>(small_model());
     graphs = owned.get();
-    segmenter = std::make_unique<NetworkSegmenter>(std::move(owned), small_model(), NetworkSegmenter::Limits{}, RoleTable(), nullptr);
+    segmenter = std::make_unique<NetworkSegmenter>(std::move(owned), small_model(), NetworkSegmenter::Limits{},
+                                                   RoleTable(), nullptr);
   }
   FakeGraphs* graphs;
   std::unique_ptr<NetworkSegmenter> segmenter;
@@ -163,9 +164,12 @@ TEST_F(ShippedNetwork, FindsWhatTheReferenceFinds) {
   for (const nlohmann::json& w : wanted) {
     if (w.at("score").get<float>() < 0.3f) continue;
     const auto same = [&](const Instance& i) {
-      return i.class_name == w.at("class").get<std::string>() && std::abs(i.score - w.at("score").get<float>()) < 0.02f &&
-             std::abs(i.box.x - w.at("box")[0].get<float>()) < 2 && std::abs(i.box.br().y - w.at("box")[3].get<float>()) < 2 &&
-             std::abs(cv::countNonZero(i.mask) - w.at("mask_pixels").get<int>()) < 0.02 * w.at("mask_pixels").get<int>() + 20;
+      return i.class_name == w.at("class").get<std::string>() &&
+             std::abs(i.score - w.at("score").get<float>()) < 0.02f &&
+             std::abs(i.box.x - w.at("box")[0].get<float>()) < 2 &&
+             std::abs(i.box.br().y - w.at("box")[3].get<float>()) < 2 &&
+             std::abs(cv::countNonZero(i.mask) - w.at("mask_pixels").get<int>()) <
+                 0.02 * w.at("mask_pixels").get<int>() + 20;
     };
     EXPECT_TRUE(std::any_of(s->instances.begin(), s->instances.end(), same)) << w.dump();
   }
@@ -185,12 +189,31 @@ TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
   }
 }
 
+TEST_F(ShippedNetwork, OpenCvFindsTheSame) {
+  SegmenterOptions options;
+  options.model = kModels.string();
+  options.backend = "opencv";
+  options.score = 0.3;
+  auto by_opencv = make_segmenter(options, RoleTable());
+  auto by_openvino = make(1, 0.3);
+  ASSERT_TRUE(by_opencv) << by_opencv.error().message;
+  ASSERT_TRUE(by_openvino);
+  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  const auto a = (*by_opencv)->segment(request(picture)), b = (*by_openvino)->segment(request(picture));
+  ASSERT_TRUE(a) << a.error().message;
+  ASSERT_TRUE(b);
+  const cv::Mat persons_a = a->mask_of_class("person"), persons_b = b->mask_of_class("person");
+  EXPECT_GT(cv::countNonZero(persons_b), 1000);
+  EXPECT_LT(cv::countNonZero(persons_a != persons_b), 0.01 * cv::countNonZero(persons_b));
+}
+
 TEST_F(ShippedNetwork, OddImagesGiveAResultOrAnError) {
   auto segmenter = make(2, 0.5);
   ASSERT_TRUE(segmenter);
-  for (const cv::Mat& image : {cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)), cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)),
-                               cv::Mat(48, 64, CV_16UC1, cv::Scalar(9000)), cv::Mat(33, 17, CV_8UC4, cv::Scalar::all(50)),
-                               cv::Mat(1, 3000, CV_8UC3, cv::Scalar::all(0)), cv::Mat(3648, 5472, CV_8UC3, cv::Scalar::all(30))}) {
+  for (const cv::Mat& image :
+       {cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)), cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)),
+        cv::Mat(48, 64, CV_16UC1, cv::Scalar(9000)), cv::Mat(33, 17, CV_8UC4, cv::Scalar::all(50)),
+        cv::Mat(1, 3000, CV_8UC3, cv::Scalar::all(0)), cv::Mat(3648, 5472, CV_8UC3, cv::Scalar::all(30))}) {
     const auto s = (*segmenter)->segment(request(image));
     ASSERT_TRUE(s) << s.error().message;
     EXPECT_EQ(s->size, image.size());

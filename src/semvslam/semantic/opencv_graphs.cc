@@ -11,7 +11,10 @@ namespace {
 class OpenCvGraphs final : public NetworkGraphs {
  public:
   OpenCvGraphs(const std::filesystem::path& folder, const ModelDescription& model)
-      : model_(model), trunk_(read(folder / model.trunk)), box_(read(folder / model.box)), mask_(read(folder / model.mask)) {
+      : model_(model),
+        trunk_(read(folder / model.trunk)),
+        box_(read(folder / model.box)),
+        mask_(read(folder / model.mask)) {
     const int box_shape[] = {kBoxBatch, kBoxCells, kBoxCells, model.channels};
     const int mask_shape[] = {kMaskBatch, kMaskCells, kMaskCells, model.channels};
     box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
@@ -28,7 +31,8 @@ class OpenCvGraphs final : public NetworkGraphs {
       trunk_.forward(outputs_, names);
       TrunkOutput out;
       for (std::size_t l = 0; l < out.size(); ++l) {
-        const int stride = model_.strides[l], rows = model_.input.height / stride, columns = model_.input.width / stride;
+        const int stride = model_.strides[l], rows = model_.input.height / stride,
+                  columns = model_.input.width / stride;
         const std::size_t cells = static_cast<std::size_t>(rows) * columns, anchors = cells * model_.anchors_per_cell();
         out[l].features = {numbers(outputs_[l], cells * model_.channels, names[l]).data(), rows, columns, stride};
         out[l].objectness = numbers(outputs_[l + 3], anchors, names[l + 3]);
@@ -47,7 +51,8 @@ class OpenCvGraphs final : public NetworkGraphs {
       const std::vector<cv::String> names{"probabilities", "deltas"};
       box_out_.clear();
       box_.forward(box_out_, names);
-      return BoxHeadOutput{numbers(box_out_[0], kBoxBatch * (model_.classes.size() + 1), names[0]), numbers(box_out_[1], kBoxBatch * 4, names[1])};
+      return BoxHeadOutput{numbers(box_out_[0], kBoxBatch * (model_.classes.size() + 1), names[0]),
+                           numbers(box_out_[1], kBoxBatch * 4, names[1])};
     });
   }
 
@@ -63,7 +68,8 @@ class OpenCvGraphs final : public NetworkGraphs {
 
  private:
   static cv::dnn::Net read(const std::filesystem::path& file) {
-    if (file.extension() != ".onnx") throw std::runtime_error(fmt::format("{}: OpenCV reads .onnx graphs only", file.string()));
+    if (file.extension() != ".onnx")
+      throw std::runtime_error(fmt::format("{}: OpenCV reads .onnx graphs only", file.string()));
     cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
     net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
     return net;
@@ -92,7 +98,8 @@ class OpenCvGraphs final : public NetworkGraphs {
 
 }  // namespace
 
-Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder, const ModelDescription& model) {
+Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder,
+                                                          const ModelDescription& model) {
   try {
     return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenCvGraphs>(folder, model));
   } catch (const std::exception& e) {

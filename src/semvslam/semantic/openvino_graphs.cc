@@ -25,7 +25,8 @@ std::size_t count(const Shape& shape) {
 
 class OpenVinoGraphs final : public NetworkGraphs {
  public:
-  OpenVinoGraphs(const std::filesystem::path& folder, const ModelDescription& model, const std::string& precision, int threads)
+  OpenVinoGraphs(const std::filesystem::path& folder, const ModelDescription& model, const std::string& precision,
+                 int threads)
       : model_(model) {
     ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(threads), ov::hint::enable_cpu_pinning(false)};
     if (precision == "f32") options.insert(ov::hint::inference_precision(ov::element::f32));
@@ -44,9 +45,12 @@ class OpenVinoGraphs final : public NetworkGraphs {
     if (image.type() != CV_8UC3 || image.size() != model_.input || !image.isContinuous())
       return Error{ErrorCode::kInternal, "the trunk got an image of a wrong size or type"};
     if (Status s = run([&] {
-          trunk_.set_input_tensor(ov::Tensor(ov::element::u8, {1, static_cast<std::size_t>(image.rows), static_cast<std::size_t>(image.cols), 3}, image.data));
+          trunk_.set_input_tensor(ov::Tensor(
+              ov::element::u8, {1, static_cast<std::size_t>(image.rows), static_cast<std::size_t>(image.cols), 3},
+              image.data));
           trunk_.infer();
-        }); !s)
+        });
+        !s)
       return s.error();
     return levels_;
   }
@@ -95,7 +99,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
       throw WrongTensor(fmt::format("expected one input, named '{}'", name));
     const ov::PartialShape shape = m->input().get_partial_shape();
     if (!shape.compatible(ov::PartialShape(ov::Shape(wanted))))
-      throw WrongTensor(fmt::format("input '{}' has the shape {}, expected [{}]", name, shape.to_string(), fmt::join(wanted, ",")));
+      throw WrongTensor(
+          fmt::format("input '{}' has the shape {}, expected [{}]", name, shape.to_string(), fmt::join(wanted, ",")));
   }
 
   void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
@@ -104,8 +109,17 @@ class OpenVinoGraphs final : public NetworkGraphs {
       const auto h = static_cast<std::size_t>(model_.input.height), w = static_cast<std::size_t>(model_.input.width);
       check_input(m, "image", {1, 3, h, w});
       ov::preprocess::PrePostProcessor p(m);
-      p.input().tensor().set_element_type(ov::element::u8).set_layout("NHWC").set_color_format(ov::preprocess::ColorFormat::BGR);
-      p.input().preprocess().convert_element_type(ov::element::f32).convert_color(ov::preprocess::ColorFormat::RGB).mean(127.5f).scale(127.5f);
+      p.input()
+          .tensor()
+          .set_element_type(ov::element::u8)
+          .set_layout("NHWC")
+          .set_color_format(ov::preprocess::ColorFormat::BGR);
+      p.input()
+          .preprocess()
+          .convert_element_type(ov::element::f32)
+          .convert_color(ov::preprocess::ColorFormat::RGB)
+          .mean(127.5f)
+          .scale(127.5f);
       p.input().model().set_layout("NCHW");
       trunk_ = compile(p.build(), options).create_infer_request();
     } catch (const std::exception& e) {
@@ -141,7 +155,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
   }
 
   /// Output memory does not move between calls: shapes are fixed.
-  static std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name, const Shape& wanted) {
+  static std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name,
+                                       const Shape& wanted) {
     ov::Tensor t;
     try {
       t = request.get_tensor(name);
@@ -149,8 +164,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
       throw WrongTensor(fmt::format("{}: there is no output '{}'", file, name));
     }
     if (t.get_element_type() != ov::element::f32 || t.get_shape() != ov::Shape(wanted))
-      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected f32 [{}]", file, name, t.get_element_type().to_string(),
-                                    t.get_shape().to_string(), fmt::join(wanted, ",")));
+      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected f32 [{}]", file, name,
+                                    t.get_element_type().to_string(), t.get_shape().to_string(),
+                                    fmt::join(wanted, ",")));
     return {t.data<float>(), count(wanted)};
   }
 
@@ -162,8 +178,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
 
 }  // namespace
 
-Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder, const ModelDescription& model,
-                                                            const std::string& precision, int threads) {
+Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
+                                                            const ModelDescription& model, const std::string& precision,
+                                                            int threads) {
   try {
     return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenVinoGraphs>(folder, model, precision, threads));
   } catch (const std::exception& e) {

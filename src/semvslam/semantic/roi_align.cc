@@ -52,7 +52,8 @@ void roi_align(const FeatureMap& map, int channels, const DetectionBox& box, int
         for (int j = 0; j < 4; ++j) {
           const float weight = y.weight[i] * x.weight[j];
           if (weight == 0.f) continue;
-          const float* __restrict from = map.data + (static_cast<std::ptrdiff_t>(y.at[i]) * map.columns + x.at[j]) * channels;
+          const float* __restrict from =
+              map.data + (static_cast<std::ptrdiff_t>(y.at[i]) * map.columns + x.at[j]) * channels;
           float* __restrict to = out;
           for (int c = 0; c < channels; ++c) to[c] += weight * from[c];
         }

@@ -7,16 +7,19 @@ namespace semvslam {
 
 std::string_view to_string(Role role) {
   switch (role) {
-    case Role::kStatic: return "static";
-    case Role::kMovable: return "movable";
-    case Role::kDynamic: break;
+    case Role::kStatic:
+      return "static";
+    case Role::kMovable:
+      return "movable";
+    case Role::kDynamic:
+      break;
   }
   return "dynamic";
 }
 
 RoleTable::RoleTable() {
-  for (const char* name : {"person", "bicycle", "car", "motorcycle", "airplane", "bus", "train", "truck", "boat", "bird",
-                           "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"})
+  for (const char* name : {"person", "bicycle", "car", "motorcycle", "airplane", "bus", "train", "truck", "boat",
+                           "bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"})
     roles_[name] = Role::kDynamic;
   for (const char* name : {"chair", "book", "cup"}) roles_[name] = Role::kMovable;
 }
@@ -31,14 +34,19 @@ Result<RoleTable> RoleTable::from_yaml(const std::string& text, const std::strin
     for (const auto& entry : root) {
       const auto name = entry.first.as<std::string>();
       Role role;
-      if (name == "dynamic") role = Role::kDynamic;
-      else if (name == "movable") role = Role::kMovable;
-      else if (name == "static") role = Role::kStatic;
-      else return wrong(fmt::format("unknown role '{}'; known: dynamic, movable, static", name));
+      if (name == "dynamic")
+        role = Role::kDynamic;
+      else if (name == "movable")
+        role = Role::kMovable;
+      else if (name == "static")
+        role = Role::kStatic;
+      else
+        return wrong(fmt::format("unknown role '{}'; known: dynamic, movable, static", name));
       if (!entry.second.IsSequence()) return wrong(fmt::format("'{}' must be a list of class names", name));
       for (const auto& item : entry.second) {
         const auto class_name = item.as<std::string>();
-        if (!table.roles_.emplace(class_name, role).second) return wrong(fmt::format("class '{}' is named twice", class_name));
+        if (!table.roles_.emplace(class_name, role).second)
+          return wrong(fmt::format("class '{}' is named twice", class_name));
       }
     }
   } catch (const YAML::Exception& e) {

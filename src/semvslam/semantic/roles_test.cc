@@ -24,9 +24,12 @@ TEST(Roles, YamlReplacesTheDefaults) {
 }
 
 TEST(Roles, ErrorsNameTheFileAndTheFault) {
-  for (const auto& [text, fault] : std::initializer_list<std::pair<const char*, const char*>>{
-           {"[a, b]", "mapping"}, {"moving: [a]", "unknown role 'moving'"}, {"dynamic: a", "list"},
-           {"dynamic: [a]\nmovable: [a]", "named twice"}, {"dynamic: [a", ""}}) {
+  for (const auto& [text, fault] :
+       std::initializer_list<std::pair<const char*, const char*>>{{"[a, b]", "mapping"},
+                                                                  {"moving: [a]", "unknown role 'moving'"},
+                                                                  {"dynamic: a", "list"},
+                                                                  {"dynamic: [a]\nmovable: [a]", "named twice"},
+                                                                  {"dynamic: [a", ""}}) {
     const Result<RoleTable> table = RoleTable::from_yaml(text, "roles.yaml");
     ASSERT_FALSE(table) << text;
     EXPECT_THAT(table.error().message, HasSubstr("roles.yaml"));

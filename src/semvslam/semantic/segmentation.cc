@@ -31,6 +31,8 @@ cv::Mat Segmentation::labels() const {
   return out;
 }
 
-int Segmentation::pixels_of_class(std::string_view class_name) const { return cv::countNonZero(mask_of_class(class_name)); }
+int Segmentation::pixels_of_class(std::string_view class_name) const {
+  return cv::countNonZero(mask_of_class(class_name));
+}
 
 }  // namespace semvslam

@@ -12,14 +12,14 @@ namespace semvslam {
 
 /// One object of one image.
 struct Instance {
-  InstanceId id;           // position in its Segmentation
-  int class_index = 0;     // into the segmenter's class names
+  InstanceId id;        // position in its Segmentation
+  int class_index = 0;  // into the segmenter's class names
   std::string class_name;
   Role role = Role::kStatic;
-  float score = 0.f;       // 0..1; 1 where the source gives none
-  cv::Rect2f box;          // px
-  cv::Rect window;         // where `mask` lies in the image; inside it
-  cv::Mat mask;            // CV_8UC1 of the window's size, 255 = the object. Shared, never written to after construction
+  float score = 0.f;  // 0..1; 1 where the source gives none
+  cv::Rect2f box;     // px
+  cv::Rect window;    // where `mask` lies in the image; inside it
+  cv::Mat mask;       // CV_8UC1 of the window's size, 255 = the object. Shared, never written to after construction
 };
 
 /// What is to be seen in one image. Late data: it names the frame that it was made from.

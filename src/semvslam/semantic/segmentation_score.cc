@@ -27,7 +27,8 @@ double overlap(const cv::Mat& found, const cv::Mat& truth, bool crowd) {
 
 }  // namespace
 
-SegmentationScorer::SegmentationScorer(const CocoDataset& dataset, double sure) : categories_(dataset.categories), sure_(sure) {}
+SegmentationScorer::SegmentationScorer(const CocoDataset& dataset, double sure)
+    : categories_(dataset.categories), sure_(sure) {}
 
 void SegmentationScorer::add(const CocoImage& image, const Segmentation& found) {
   ++images_;
@@ -47,8 +48,9 @@ void SegmentationScorer::add(const CocoImage& image, const Segmentation& found) 
   }
 }
 
-void SegmentationScorer::add_class(const std::string& name, const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd,
-                                   const std::vector<const Instance*>& found, cv::Size size) {
+void SegmentationScorer::add_class(const std::string& name, const std::vector<cv::Mat>& truth,
+                                   const std::vector<bool>& crowd, const std::vector<const Instance*>& found,
+                                   cv::Size size) {
   ClassRecord& record = classes_[name];
   record.objects += static_cast<int>(std::count(crowd.begin(), crowd.end(), false));
   std::vector<std::size_t> order(truth.size());
@@ -84,7 +86,8 @@ void SegmentationScorer::add_class(const std::string& name, const std::vector<cv
 void SegmentationScorer::add_person_pixels(const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd,
                                            const std::vector<const Instance*>& found, cv::Size size) {
   cv::Mat person = cv::Mat::zeros(size, CV_8UC1), unsure = person.clone(), mine = person.clone();
-  for (std::size_t t = 0; t < truth.size(); ++t) cv::bitwise_or(crowd[t] ? unsure : person, truth[t], crowd[t] ? unsure : person);
+  for (std::size_t t = 0; t < truth.size(); ++t)
+    cv::bitwise_or(crowd[t] ? unsure : person, truth[t], crowd[t] ? unsure : person);
   std::vector<cv::Mat> masks;
   for (const Instance* i : found)
     if (i->score >= sure_) {
@@ -103,7 +106,9 @@ void SegmentationScorer::add_person_pixels(const std::vector<cv::Mat>& truth, co
   std::sort(near.begin(), near.end());
   near_ += static_cast<int>(near.size());
   for (const auto& [area, t] : near) {
-    const auto better = [&, index = t](const cv::Mat& a, const cv::Mat& b) { return overlap(a, truth[index], false) < overlap(b, truth[index], false); };
+    const auto better = [&, index = t](const cv::Mat& a, const cv::Mat& b) {
+      return overlap(a, truth[index], false) < overlap(b, truth[index], false);
+    };
     const auto best = std::max_element(masks.begin(), masks.end(), better);
     if (best == masks.end()) continue;
     const double iou = overlap(*best, truth[t], false);
@@ -117,7 +122,8 @@ double SegmentationScorer::average_precision(const ClassRecord& record, int over
   std::vector<const Detection*> order;
   for (const Detection& d : record.detections)
     if (!d.ignored[overlap_index]) order.push_back(&d);
-  std::stable_sort(order.begin(), order.end(), [](const Detection* a, const Detection* b) { return a->score > b->score; });
+  std::stable_sort(order.begin(), order.end(),
+                   [](const Detection* a, const Detection* b) { return a->score > b->score; });
   std::vector<double> recall, precision;
   int hits = 0;
   for (std::size_t n = 0; n < order.size(); ++n) {
@@ -135,7 +141,9 @@ double SegmentationScorer::average_precision(const ClassRecord& record, int over
 }
 
 SegmentationScore SegmentationScorer::score() const {
-  const auto share = [](std::int64_t a, std::int64_t b) { return b > 0 ? static_cast<double>(a) / static_cast<double>(b) : -1.0; };
+  const auto share = [](std::int64_t a, std::int64_t b) {
+    return b > 0 ? static_cast<double>(a) / static_cast<double>(b) : -1.0;
+  };
   SegmentationScore out;
   out.images = images_;
   out.person_pixel_iou = share(both_, either_);
@@ -143,7 +151,9 @@ SegmentationScore SegmentationScorer::score() const {
   out.person_pixel_precision = share(both_, found_pixels_);
   out.near_persons = near_;
   out.near_person_recall = share(std::ssize(near_ious_), near_);
-  if (!near_ious_.empty()) out.near_person_mean_iou = std::accumulate(near_ious_.begin(), near_ious_.end(), 0.0) / static_cast<double>(near_ious_.size());
+  if (!near_ious_.empty())
+    out.near_person_mean_iou =
+        std::accumulate(near_ious_.begin(), near_ious_.end(), 0.0) / static_cast<double>(near_ious_.size());
   double sum = 0, sum50 = 0;
   int present = 0;
   for (const auto& [name, record] : classes_) {

@@ -39,8 +39,10 @@ class SegmentationScorer {
     std::vector<Detection> detections;
     int objects = 0;
   };
-  void add_class(const std::string& name, const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd, const std::vector<const Instance*>& found, cv::Size size);
-  void add_person_pixels(const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd, const std::vector<const Instance*>& found, cv::Size size);
+  void add_class(const std::string& name, const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd,
+                 const std::vector<const Instance*>& found, cv::Size size);
+  void add_person_pixels(const std::vector<cv::Mat>& truth, const std::vector<bool>& crowd,
+                         const std::vector<const Instance*>& found, cv::Size size);
   static double average_precision(const ClassRecord& record, int overlap);
 
   std::map<int, std::string> categories_;

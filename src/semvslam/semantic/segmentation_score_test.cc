@@ -36,7 +36,8 @@ TEST_F(SegmentationScoreTest, PolygonsCoverTheSamePixels) {
   const Result<CocoDataset> dataset = CocoDataset::read(path_);
   ASSERT_TRUE(dataset) << dataset.error().message;
   for (const nlohmann::json& d : golden_.at("detections"))
-    EXPECT_EQ(cv::countNonZero(mask_of(d, dataset->images[d.at("image_id").get<std::size_t>() - 1].size)), d.at("area").get<int>());
+    EXPECT_EQ(cv::countNonZero(mask_of(d, dataset->images[d.at("image_id").get<std::size_t>() - 1].size)),
+              d.at("area").get<int>());
 }
 
 TEST_F(SegmentationScoreTest, AveragePrecisionIsThatOfPycocotools) {
@@ -55,7 +56,8 @@ TEST_F(SegmentationScoreTest, AveragePrecisionIsThatOfPycocotools) {
       i.mask = mask_of(d, s.size);
       s.instances.push_back(i);
     }
-    std::stable_sort(s.instances.begin(), s.instances.end(), [](const Instance& a, const Instance& b) { return a.score > b.score; });
+    std::stable_sort(s.instances.begin(), s.instances.end(),
+                     [](const Instance& a, const Instance& b) { return a.score > b.score; });
     scorer.add(dataset->images[n], s);
   }
   const SegmentationScore score = scorer.score();
@@ -97,7 +99,8 @@ TEST(CocoDataset, RunLengthsGoDownTheColumns) {
 
 TEST(CocoDataset, DamagedFilesAreNamed) {
   const fs::path path = fs::temp_directory_path() / ("coco_bad_" + std::to_string(::getpid()) + ".json");
-  for (const char* text : {"", "[]", "{\"images\": 3}", "{\"images\": [], \"categories\": [], \"annotations\": [{\"image_id\": 4}]}"}) {
+  for (const char* text :
+       {"", "[]", "{\"images\": 3}", "{\"images\": [], \"categories\": [], \"annotations\": [{\"image_id\": 4}]}"}) {
     std::ofstream(path) << text;
     const auto dataset = CocoDataset::read(path);
     ASSERT_FALSE(dataset) << text;

@@ -25,7 +25,8 @@ std::vector<float> formula_map(int rows, int columns, int channels) {
   std::vector<float> out;
   for (int y = 0; y < rows; ++y)
     for (int x = 0; x < columns; ++x)
-      for (int c = 0; c < channels; ++c) out.push_back(static_cast<float>((37 * y + 17 * x + 11 * c) % 101) / 50.f - 1.f);
+      for (int c = 0; c < channels; ++c)
+        out.push_back(static_cast<float>((37 * y + 17 * x + 11 * c) % 101) / 50.f - 1.f);
   return out;
 }
 
@@ -39,7 +40,8 @@ TEST(SegmentationSteps, RoiAlignGivesTheReferencesNumbers) {
     std::vector<float> seven(7 * 7 * 4), fourteen(14 * 14 * 4);
     roi_align(levels[roi_level(box, box_levels)], 4, box, 7, seven.data());
     roi_align(levels[roi_level(box, mask_levels)], 4, box, 14, fourteen.data());
-    for (std::size_t i = 0; i < seven.size(); ++i) ASSERT_NEAR(seven[i], wanted.at("cells7")[n][i].get<float>(), 2e-4) << n << " " << i;
+    for (std::size_t i = 0; i < seven.size(); ++i)
+      ASSERT_NEAR(seven[i], wanted.at("cells7")[n][i].get<float>(), 2e-4) << n << " " << i;
     for (std::size_t c = 0; c < 4; ++c) {
       float sum = 0;
       for (std::size_t i = c; i < fourteen.size(); i += 4) sum += fourteen[i];
@@ -53,10 +55,12 @@ TEST(SegmentationSteps, PastingGivesTheReferencesPixels) {
   std::vector<float> probabilities;
   for (int y = 0; y < 28; ++y)
     for (int x = 0; x < 28; ++x) probabilities.push_back(static_cast<float>((13 * y + 7 * x) % 29) / 28.f);
-  const PastedMask pasted = paste_mask(probabilities.data(), 28, box_of(wanted.at("box")), {wanted.at("width"), wanted.at("height")});
+  const PastedMask pasted =
+      paste_mask(probabilities.data(), 28, box_of(wanted.at("box")), {wanted.at("width"), wanted.at("height")});
   EXPECT_EQ(pasted.window, cv::Rect(wanted.at("x0"), wanted.at("y0"), wanted.at("w"), wanted.at("h")));
   int differing = 0;
-  for (int y = 0; y < pasted.mask.rows; ++y) differing += std::abs(cv::countNonZero(pasted.mask.row(y)) - wanted.at("row_counts")[y].get<int>());
+  for (int y = 0; y < pasted.mask.rows; ++y)
+    differing += std::abs(cv::countNonZero(pasted.mask.row(y)) - wanted.at("row_counts")[y].get<int>());
   EXPECT_LE(differing, 3);  // a value of 0.5 sharp may fall to either side
 }
 
@@ -64,10 +68,12 @@ TEST(SegmentationSteps, SuppressionAndDecodingAgreeWithTheReference) {
   const nlohmann::json nms = formulas().at("nms"), decode = formulas().at("decode");
   std::vector<DetectionBox> boxes;
   for (const auto& b : nms.at("boxes")) boxes.push_back(box_of(b));
-  EXPECT_EQ(suppress_overlaps(boxes, nms.at("scores").get<std::vector<float>>(), nms.at("threshold"), 50), nms.at("keep").get<std::vector<int>>());
+  EXPECT_EQ(suppress_overlaps(boxes, nms.at("scores").get<std::vector<float>>(), nms.at("threshold"), 50),
+            nms.at("keep").get<std::vector<int>>());
   for (std::size_t i = 0; i < decode.at("boxes").size(); ++i) {
     const auto deltas = decode.at("deltas")[i].get<std::vector<float>>();
-    const DetectionBox box = decode_box(deltas.data(), box_of(decode.at("reference")[i]), {1, 1, 1, 1}, decode.at("width"), decode.at("height"));
+    const DetectionBox box = decode_box(deltas.data(), box_of(decode.at("reference")[i]), {1, 1, 1, 1},
+                                        decode.at("width"), decode.at("height"));
     const DetectionBox wanted = box_of(decode.at("boxes")[i]);
     EXPECT_NEAR(box.x0, wanted.x0, 1e-2);
     EXPECT_NEAR(box.y1, wanted.y1, 1e-2);

@@ -21,12 +21,14 @@ class NoSegmenter final : public Segmenter {
   std::vector<std::string> names_;
 };
 
-Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options, const RoleTable& roles, StageTimers* timers) {
+Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options, const RoleTable& roles,
+                                                StageTimers* timers) {
   Result<ModelDescription> model = ModelDescription::read(options.model);
   if (!model) return model.error();
   const bool openvino = options.backend == "openvino" || (options.backend == "auto" && have_openvino());
-  Result<std::unique_ptr<NetworkGraphs>> graphs = openvino ? make_openvino_graphs(options.model, *model, options.precision, options.threads)
-                                                           : make_opencv_graphs(options.model, *model);
+  Result<std::unique_ptr<NetworkGraphs>> graphs =
+      openvino ? make_openvino_graphs(options.model, *model, options.precision, options.threads)
+               : make_opencv_graphs(options.model, *model);
   if (!graphs) return graphs.error();
   NetworkSegmenter::Limits limits;
   limits.score = static_cast<float>(options.score);
@@ -40,17 +42,20 @@ void SegmenterOptions::add_to(ConfigSchema& schema) {
   schema.add("segment.source", &source, {"network", "folder", "none"}, "where masks come from");
   schema.add("segment.model", &model, {}, "folder with the network's model.json");
   schema.add("segment.backend", &backend, {"auto", "openvino", "opencv"}, "library that runs the network");
-  schema.add("segment.precision", &precision, {"auto", "f32"}, "auto = fastest type of this machine, f32 = alike everywhere");
+  schema.add("segment.precision", &precision, {"auto", "f32"},
+             "auto = fastest type of this machine, f32 = alike everywhere");
   schema.add("segment.mask_folder", &mask_folder, {}, "folder of masks (PNG), for source = folder");
   schema.add("segment.score", &score, {0.01, 1.0}, "least score of an object");
   schema.add("segment.threads", &threads, {1, 64}, "threads of the network");
 }
 
-Result<std::unique_ptr<Segmenter>> make_segmenter(const SegmenterOptions& options, const RoleTable& roles, StageTimers* timers) {
+Result<std::unique_ptr<Segmenter>> make_segmenter(const SegmenterOptions& options, const RoleTable& roles,
+                                                  StageTimers* timers) {
   if (options.source == "none") return std::unique_ptr<Segmenter>(std::make_unique<NoSegmenter>());
   if (options.source == "folder") return FolderSegmenter::open(options.mask_folder, roles);
   if (options.source == "network") return make_network(options, roles, timers);
-  return Error{ErrorCode::kInvalidInput, fmt::format("segment.source: '{}' is none of network, folder, none", options.source)};
+  return Error{ErrorCode::kInvalidInput,
+               fmt::format("segment.source: '{}' is none of network, folder, none", options.source)};
 }
 
 }  // namespace semvslam

@@ -18,8 +18,8 @@ namespace semvslam {
 struct SegmentationRequest {
   FrameId frame;
   TimeStamp stamp;
-  cv::Mat image;      // CV_8UC3 BGR, CV_8UC4 BGRA or CV_8UC1; 16-bit images are scaled down
-  std::string name;   // file name without folder, where there is one
+  cv::Mat image;     // CV_8UC3 BGR, CV_8UC4 BGRA or CV_8UC1; 16-bit images are scaled down
+  std::string name;  // file name without folder, where there is one
 };
 
 /// Finds the objects of an image. One call at a time per object: not safe for concurrent use; make one per thread.
