@@ -13,8 +13,8 @@ struct BriefTest {
   std::int8_t ax, ay, bx, by;
 };
 
-/// The 256 tests: point pairs drawn from an isotropic Gaussian (Calonder et al., BRIEF, ECCV 2010, variant G II).
-/// Made from a fixed seed with integer arithmetic only, so that every machine makes the same ones.
+/// The 256 tests. Learned by learn_brief_pattern.cc on generated images; says there how. A change makes descriptors of
+/// before and after incomparable, and with them every stored map and vocabulary.
 const std::array<BriefTest, 256>& brief_pattern();
 
 }  // namespace semvslam

@@ -74,7 +74,7 @@ cv::Mat noisy(const cv::Mat& image, double gain, double sigma, cv::RNG& random) 
   return sum;
 }
 
-/// Values of the disc's points around every feature, turned back by its angle as OrientedBrief does.
+/// Values of the disc's points around every feature, turned back by its angle (in 64 steps).
 using Patch = std::vector<std::uint8_t>;
 std::vector<Patch> patches_of(const OrbFeatures& features, const std::vector<cv::Mat>& pyramid,
                               const std::vector<cv::Point>& points) {

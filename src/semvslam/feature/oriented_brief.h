@@ -20,7 +20,9 @@ float patch_angle_rad(const std::uint8_t* centre, std::ptrdiff_t stride);
 /// Rotated BRIEF: the tests of brief_pattern(), turned into the patch's direction in steps of 360 / kAngles degrees.
 class OrientedBrief {
  public:
-  static constexpr int kAngles = 64;
+  /// 128 against 64 steps: 2 % more right matches on recordings; against exact angles: 1 % less, at a fraction of the
+  /// time.
+  static constexpr int kAngles = 128;
 
   OrientedBrief();
   /// Must be called before describe(): row stride of the smoothed image in bytes. Cheap when it did not change.
