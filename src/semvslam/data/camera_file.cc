@@ -157,7 +157,7 @@ Result<Camera> parse_camera(const std::string& text, const std::string& name) {
     const bool set = std::any_of(seen.begin(), seen.end(), [&](const Key* k) { return k->field == key.field; });
     if (key.required && !set) return fail(fmt::format("key '{}' is missing", key.name));
   }
-  return checked(std::move(values), name);
+  return checked(values, name);
 }
 
 Result<Camera> read_camera(const std::filesystem::path& path) {
