@@ -7,6 +7,10 @@
 
 #include "semvslam/feature/blocks.h"
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 namespace semvslam {
 namespace {
 
@@ -75,6 +79,21 @@ void mark_maxima(const Pixel* above, const Pixel* row, const Pixel* below, int n
   });
 }
 
+/// Bit i is mark[i], which is 0 or 1.
+std::uint64_t pack_marks(const Pixel* mark) {
+#ifdef __AVX2__
+  const auto half = [&](int at) {
+    const __m256i bytes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(mark + at));
+    return static_cast<std::uint32_t>(_mm256_movemask_epi8(_mm256_slli_epi16(bytes, 7)));
+  };
+  return half(0) | static_cast<std::uint64_t>(half(32)) << 32;
+#else
+  std::uint64_t bits = 0;
+  for (int i = 0; i < 64; ++i) bits |= static_cast<std::uint64_t>(mark[i]) << i;
+  return bits;
+#endif
+}
+
 }  // namespace
 
 void FastDetector::detect(const cv::Mat& image, int border, int threshold, std::vector<Corner>& out) {
@@ -90,23 +109,23 @@ void FastDetector::detect(const cv::Mat& image, int border, int threshold, std::
   std::memset(mark, 0, pitch);
   const auto stride = static_cast<std::ptrdiff_t>(image.step[0]);
   const auto score_image_row = [&](int y, Pixel* to) { score_row(image.ptr<Pixel>(y) + x0 - 1, stride, n, to); };
+  std::size_t count = 0;
   score_image_row(y0 - 1, scores[0]);
   score_image_row(y0, scores[1]);
   for (int y = y0; y < y0 + height; ++y) {
     score_image_row(y + 1, scores[2]);
     mark_maxima(scores[0] + 1, scores[1] + 1, scores[2] + 1, width, static_cast<Pixel>(threshold), mark);
-    for (std::size_t x = 0; x < static_cast<std::size_t>(width); x += 8) {
-      std::uint64_t eight;
-      std::memcpy(&eight, mark + x, 8);
-      static_assert(std::endian::native == std::endian::little);
-      for (; eight != 0; eight &= eight - 1) {
-        const std::size_t i = x + static_cast<std::size_t>(std::countr_zero(eight)) / 8;
-        out.push_back({static_cast<std::uint16_t>(static_cast<int>(i) + x0), static_cast<std::uint16_t>(y),
-                       static_cast<std::uint16_t>(scores[1][i + 1] - 1)});
+    if (found_.size() < count + pitch) found_.resize(2 * (count + pitch));
+    for (std::size_t x = 0; x < pitch; x += 64) {
+      for (std::uint64_t bits = pack_marks(mark + x); bits != 0; bits &= bits - 1) {
+        const std::size_t i = x + static_cast<std::size_t>(std::countr_zero(bits));
+        found_[count++] = {static_cast<std::uint16_t>(static_cast<int>(i) + x0), static_cast<std::uint16_t>(y),
+                           static_cast<std::uint16_t>(scores[1][i + 1] - 1)};
       }
     }
     std::rotate(scores.begin(), scores.begin() + 1, scores.end());
   }
+  out.assign(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 }  // namespace semvslam

@@ -24,6 +24,7 @@ class FastDetector {
   void detect(const cv::Mat& image, int border, int threshold, std::vector<Corner>& out);
 
  private:
+  std::vector<Corner> found_;       // longer than what was found: a row is written without asking for room
   std::vector<std::uint8_t> rows_;  // scores of three rows, then marks of one row
 };
 
