@@ -62,7 +62,8 @@ TEST(Skeleton, WeightsSumToOneAndVarySmoothly) {
         sum += w.weights[k];
       }
       EXPECT_NEAR(sum, 1.f, 1e-5f);
-      for (int b = 0; i > 0 && b < kBones; ++b) EXPECT_LT(std::abs(now[b] - last[b]), 0.12f) << "bone " << b << " step " << i;
+      for (int b = 0; i > 0 && b < kBones; ++b)
+        EXPECT_LT(std::abs(now[b] - last[b]), 0.12f) << "bone " << b << " step " << i;
       last = now;
     }
   }
@@ -86,7 +87,8 @@ TEST(Skeleton, DualQuaternionSkinningTurnsRigidPartsRigidly) {
 double lowest_sole(const BodyPose& pose, Bone foot, int side) {
   const auto motions = solve_pose(pose);
   double z = 1e9;
-  for (const Eigen::Vector3d& p : {Eigen::Vector3d(side * 0.115, -0.088, 0.004), Eigen::Vector3d(side * 0.125, 0.1, 0), Eigen::Vector3d(side * 0.128, 0.188, 0.004)}) {
+  for (const Eigen::Vector3d& p : {Eigen::Vector3d(side * 0.115, -0.088, 0.004), Eigen::Vector3d(side * 0.125, 0.1, 0),
+                                   Eigen::Vector3d(side * 0.128, 0.188, 0.004)}) {
     z = std::min(z, (motions[foot] * p).z());
   }
   return z;
@@ -105,20 +107,25 @@ TEST(Gait, OneFootIsAlwaysOnTheFloorAndTheOtherSwings) {
 }
 
 TEST(Gait, LegsAreHalfACycleApartAndStepsFitTheStride) {
-  const auto early = solve_pose(walking_pose(0.1, 1.0, ArmTask::kSwing, 0, 0)), late = solve_pose(walking_pose(0.6, 1.0, ArmTask::kSwing, 0, 0));
-  const Eigen::Vector3d right = early[kFootR] * rest_bones()[kFootR].joint, left = late[kFootL] * rest_bones()[kFootL].joint;
+  const auto early = solve_pose(walking_pose(0.1, 1.0, ArmTask::kSwing, 0, 0)),
+             late = solve_pose(walking_pose(0.6, 1.0, ArmTask::kSwing, 0, 0));
+  const Eigen::Vector3d right = early[kFootR] * rest_bones()[kFootR].joint,
+                        left = late[kFootL] * rest_bones()[kFootL].joint;
   EXPECT_NEAR(right.y(), left.y(), 1e-6);
   EXPECT_NEAR(right.x(), -left.x(), 1e-6);
   // During stance the foot goes back under the body as fast as the body goes forward: else shoes would slide.
-  const auto start = solve_pose(walking_pose(0.08, 0.92, ArmTask::kSwing, 0, 0)), end = solve_pose(walking_pose(0.42, 0.92, ArmTask::kSwing, 0, 0));
+  const auto start = solve_pose(walking_pose(0.08, 0.92, ArmTask::kSwing, 0, 0)),
+             end = solve_pose(walking_pose(0.42, 0.92, ArmTask::kSwing, 0, 0));
   const double back = (start[kFootR] * rest_bones()[kFootR].joint).y() - (end[kFootR] * rest_bones()[kFootR].joint).y();
   EXPECT_NEAR(back, 0.34 * kStride_m, 0.12);
 }
 
 TEST(Gait, ArmsSwingAgainstTheLegs) {
   const auto motions = solve_pose(walking_pose(0.0, 1.0, ArmTask::kSwing, 0, 0));  // right heel strikes
-  EXPECT_GT((motions[kFootR] * rest_bones()[kFootR].joint).y(), (motions[kFootL] * rest_bones()[kFootL].joint).y() + 0.3);
-  EXPECT_LT((motions[kHandR] * rest_bones()[kHandR].joint).y(), (motions[kHandL] * rest_bones()[kHandL].joint).y() - 0.2);
+  EXPECT_GT((motions[kFootR] * rest_bones()[kFootR].joint).y(),
+            (motions[kFootL] * rest_bones()[kFootL].joint).y() + 0.3);
+  EXPECT_LT((motions[kHandR] * rest_bones()[kHandR].joint).y(),
+            (motions[kHandL] * rest_bones()[kHandL].joint).y() - 0.2);
 }
 
 TEST(Gait, SeatedFeetRestOnTheFloor) {
@@ -138,7 +145,8 @@ TEST(PlanPath, ClosedSmoothAndParameterisedByLength) {
   for (double s = -1; s < path.length_m() + 1; s += step) {
     const Eigen::Vector2d move = path.position(s + step) - path.position(s);
     EXPECT_NEAR(move.norm(), step, 1e-5);
-    EXPECT_GT(move.normalized().dot(Eigen::Vector2d(std::cos(path.heading_rad(s)), std::sin(path.heading_rad(s)))), 0.9998);
+    EXPECT_GT(move.normalized().dot(Eigen::Vector2d(std::cos(path.heading_rad(s)), std::sin(path.heading_rad(s)))),
+              0.9998);
   }
 }
 

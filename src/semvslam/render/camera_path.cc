@@ -69,7 +69,8 @@ CameraPath::View CameraPath::planned(double time_s) const {
   view.roll_rad = 0;
   switch (motion_) {
     case Motion::kXyz:
-      view.position += Eigen::Vector3d(0.34 * sway(0, time_s, 0.12), 0.20 * sway(1, time_s, 0.15), 0.22 * sway(2, time_s, 0.13));
+      view.position +=
+          Eigen::Vector3d(0.34 * sway(0, time_s, 0.12), 0.20 * sway(1, time_s, 0.15), 0.22 * sway(2, time_s, 0.13));
       view.yaw_rad += kDegree * 2.0 * sway(3, time_s, 0.1);
       view.pitch_rad += kDegree * 2.0 * sway(4, time_s, 0.12);
       break;
@@ -89,7 +90,8 @@ CameraPath::View CameraPath::planned(double time_s) const {
       view.roll_rad = kDegree * 5 * sway(4, time_s, 0.1);
       break;
     }
-    default: break;
+    default:
+      break;
   }
   return view;
 }
@@ -101,7 +103,8 @@ SE3 CameraPath::pose(double time_s) const {
   view.yaw_rad += 0.10 * amount * kDegree * tremor(3, time_s);
   view.pitch_rad += 0.10 * amount * kDegree * tremor(4, time_s);
   view.roll_rad += 0.08 * amount * kDegree * tremor(5, time_s);
-  const double cp = std::cos(view.pitch_rad), sp = std::sin(view.pitch_rad), cy = std::cos(view.yaw_rad), sy = std::sin(view.yaw_rad);
+  const double cp = std::cos(view.pitch_rad), sp = std::sin(view.pitch_rad), cy = std::cos(view.yaw_rad),
+               sy = std::sin(view.yaw_rad);
   Eigen::Matrix3d axes;
   axes.col(2) = Eigen::Vector3d(cp * cy, cp * sy, -sp);
   axes.col(0) = Eigen::Vector3d(sy, -cy, 0);

@@ -14,6 +14,9 @@
 
 namespace semvslam::render {
 
+/// The closed way around the desks on which people walk.
+PlanPath walkers_way();
+
 /// The people of a scene and what they carry: who they are, where they are at a time, and their meshes.
 class Cast {
  public:
@@ -23,14 +26,15 @@ class Cast {
   };
 
   /// @param people as SceneOptions::people, already checked. Adds textures and carried things to `builder`.
-  Cast(const std::string& people, std::uint64_t seed, const std::vector<Seat>& seats, SceneBuilder& builder, int threads);
+  Cast(const std::string& people, std::uint64_t seed, const std::vector<Seat>& seats, SceneBuilder& builder,
+       int threads);
 
   /// Takes the carried things out of the finished scene: they move by themselves.
   void take_items(StaticScene& scene);
   const std::vector<Role>& roles() const { return roles_; }
 
-  /// Meshes at a time, role numbers set (1 + index into roles()), and what darkens the floor. @param eye near it the finer
-  /// surfaces are used.
+  /// Meshes at a time, role numbers set (1 + index into roles()), and what darkens the floor. @param eye near it the
+  /// finer surfaces are used.
   void arrange(double time_s, const Eigen::Vector3d& eye, const LightModel& light, std::vector<Mesh>& meshes,
                std::vector<Occluder>& occluders) const;
 
@@ -55,7 +59,8 @@ class Cast {
   Placement sitter(const Member& member, double time_s) const;
   double walked_m(double time_s) const;
   void build_item(Member& member, SceneBuilder& builder, std::uint64_t seed);
-  static void add_occluders(const Placement& placement, const std::array<BoneMotion, kBones>& motions, double scale, std::vector<Occluder>& out);
+  static void add_occluders(const Placement& placement, const std::array<BoneMotion, kBones>& motions, double scale,
+                            std::vector<Occluder>& out);
 
   std::vector<Member> members_;
   std::vector<Role> roles_;

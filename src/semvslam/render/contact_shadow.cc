@@ -10,8 +10,10 @@ constexpr double kReach_m = 1.1;
 constexpr double kStrength = 1.25;
 
 double distance_to_patch(const LightPatch& patch, const Eigen::Vector3d& p) {
-  const Eigen::Vector3d u = patch.column_step * (patch.columns - 1), v = patch.row_step * (patch.rows - 1), from = p - patch.origin;
-  const double a = std::clamp(from.dot(u) / u.squaredNorm(), 0.0, 1.0), b = std::clamp(from.dot(v) / v.squaredNorm(), 0.0, 1.0);
+  const Eigen::Vector3d u = patch.column_step * (patch.columns - 1), v = patch.row_step * (patch.rows - 1),
+                        from = p - patch.origin;
+  const double a = std::clamp(from.dot(u) / u.squaredNorm(), 0.0, 1.0),
+               b = std::clamp(from.dot(v) / v.squaredNorm(), 0.0, 1.0);
   return (from - a * u - b * v).norm();
 }
 
@@ -27,7 +29,8 @@ void ContactShadow::update(const std::vector<LightPatch>& patches, const std::ve
   for (const std::size_t i : touched_) {
     const LightPatch& patch = patches[i];
     for (int r = 0; r < patch.rows; ++r) {
-      for (int c = 0; c < patch.columns; ++c) current_.at(patch.column + c, patch.row + r) = baked_.at(patch.column + c, patch.row + r);
+      for (int c = 0; c < patch.columns; ++c)
+        current_.at(patch.column + c, patch.row + r) = baked_.at(patch.column + c, patch.row + r);
     }
   }
   touched_.clear();

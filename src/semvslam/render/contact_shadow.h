@@ -13,8 +13,8 @@ struct Occluder {
   double radius_m;
 };
 
-/// Darkens baked light around moving things: each ball takes away the share of the hemisphere that it covers, weighted by
-/// the cosine (n . d) r^2 / d^2.
+/// Darkens baked light around moving things: each ball takes away the share of the hemisphere that it covers, weighted
+/// by the cosine (n . d) r^2 / d^2.
 class ContactShadow {
  public:
   /// @param light the baked atlas; `current()` starts as its copy.

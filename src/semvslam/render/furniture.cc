@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kSpinesPerImage = 32;
 
-/// The skin that shows one part (x, y, width, height as shares of the image, y from the top) on a surface of a given size.
+/// The skin that shows one part (x, y, width, height as shares of the image, y from the top) on a surface of a given
+/// size.
 Skin part_of(std::uint16_t texture, double x, double y, double width, double height, double surface_width_m,
              double surface_height_m) {
   const Eigen::Vector2d image(surface_width_m / width, surface_height_m / height);
@@ -26,11 +27,17 @@ SE3 on_plan(double x_m, double y_m, double z_m, double turn_deg) {
 Furnisher::Furnisher(SceneBuilder& builder, std::uint64_t seed) : builder_(builder), random_(mix64(seed, 71)) {
   dark_wood_ = builder.add_texture([s = random_.bits32()] { return paint_wood({512, 512}, {48, 78, 118}, 1, s); });
   light_wood_ = builder.add_texture([s = random_.bits32()] { return paint_wood({512, 512}, {128, 172, 212}, 1, s); });
-  white_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {214, 218, 220}, 0.08f, s); });
+  white_ = builder.add_texture([s = random_.bits32()] {
+    return paint_material({256, 256}, {214, 218, 220}, 0.08f, s);
+  });
   black_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {40, 38, 37}, 0.35f, s); });
   grey_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {128, 124, 120}, 0.2f, s); });
-  metal_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {165, 165, 162}, 0.15f, s); });
-  terracotta_ = builder.add_texture([s = random_.bits32()] { return paint_material({256, 256}, {70, 100, 170}, 0.3f, s); });
+  metal_ = builder.add_texture([s = random_.bits32()] {
+    return paint_material({256, 256}, {165, 165, 162}, 0.15f, s);
+  });
+  terracotta_ = builder.add_texture([s = random_.bits32()] {
+    return paint_material({256, 256}, {70, 100, 170}, 0.3f, s);
+  });
   paper_edge_ = builder.add_texture([s = random_.bits32()] { return paint_wood({256, 64}, {185, 205, 215}, 1, s); });
   for (auto& id : fabric_) {
     const double hue = random_.uniform();
@@ -39,7 +46,8 @@ Furnisher::Furnisher(SceneBuilder& builder, std::uint64_t seed) : builder_(build
     });
   }
   for (auto& id : leaf_) id = builder.add_texture([s = random_.bits()] { return paint_leaf({64, 256}, s); }, false);
-  for (auto& id : spines_) id = builder.add_texture([s = random_.bits()] { return paint_spines({2048, 256}, kSpinesPerImage, s); }, false);
+  for (auto& id : spines_)
+    id = builder.add_texture([s = random_.bits()] { return paint_spines({2048, 256}, kSpinesPerImage, s); }, false);
   for (auto& id : carton_) id = builder.add_texture([s = random_.bits()] { return paint_cardboard({512, 512}, s); });
   for (auto& id : label_) id = builder.add_texture([s = random_.bits()] { return paint_label({256, 128}, s); });
   for (auto& id : page_) id = builder.add_texture([s = random_.bits()] { return paint_page({512, 724}, s); }, false);
@@ -54,15 +62,18 @@ void Furnisher::row_of_books(const SE3& pose, double width_m, double height_m, d
   double x = -width_m / 2;
   const double usual = random_.uniform(0.62, 0.85) * height_m;
   while (true) {
-    const double thick = random_.uniform(0.018, 0.05), tall = std::min(height_m * 0.96, usual * random_.uniform(0.82, 1.12));
+    const double thick = random_.uniform(0.018, 0.05),
+                 tall = std::min(height_m * 0.96, usual * random_.uniform(0.82, 1.12));
     if (x + thick > width_m / 2) break;
     const double deep = depth_m * random_.uniform(0.65, 0.9);
     const int number = random_.below(kSpinesPerImage);
     const std::uint16_t image = spines_[random_.below(3)];
-    const Skin spine = part_of(image, static_cast<double>(number) / kSpinesPerImage, 0, 1.0 / kSpinesPerImage, 1, thick, tall);
+    const Skin spine =
+        part_of(image, static_cast<double>(number) / kSpinesPerImage, 0, 1.0 / kSpinesPerImage, 1, thick, tall);
     Skin cover = part_of(image, (number + 0.1) / kSpinesPerImage, 0.02, 0.06 / kSpinesPerImage, 0.02, deep, tall);
     const double front = -depth_m / 2 + random_.uniform(0.005, 0.04);
-    builder_.box(pose * on_plan(x + thick / 2, front + deep / 2), {thick * 0.97, deep, tall}, cover, spine, plain(paper_edge_), false);
+    builder_.box(pose * on_plan(x + thick / 2, front + deep / 2), {thick * 0.97, deep, tall}, cover, spine,
+                 plain(paper_edge_), false);
     x += thick;
   }
 }
@@ -74,11 +85,16 @@ void Furnisher::books_on_board(const SE3& pose, double width_m, double height_m,
     const double part = std::min(room, random_.uniform(0.16, 0.5));
     const SE3 here = pose * on_plan(x + part / 2, 0);
     const double what = random_.uniform();
-    if (what < 0.68) row_of_books(here, part - 0.01, height_m, depth_m);
-    else if (what < 0.78) book_stack(here, 3 + random_.below(4));
-    else if (what < 0.88) carton(here, {part * 0.8, depth_m * 0.7, height_m * random_.uniform(0.4, 0.8)});
-    else if (what < 0.94) plant(here, height_m * 0.85);
-    else bottle(here);
+    if (what < 0.68)
+      row_of_books(here, part - 0.01, height_m, depth_m);
+    else if (what < 0.78)
+      book_stack(here, 3 + random_.below(4));
+    else if (what < 0.88)
+      carton(here, {part * 0.8, depth_m * 0.7, height_m * random_.uniform(0.4, 0.8)});
+    else if (what < 0.94)
+      plant(here, height_m * 0.85);
+    else
+      bottle(here);
     x += part;
   }
 }
@@ -106,7 +122,8 @@ void Furnisher::cabinet(const SE3& pose, const Eigen::Vector3d& size_m, int door
   const double width = size_m.x() / doors;
   for (int i = 0; i < doors; ++i) {
     const double x = -size_m.x() / 2 + (i + 0.5) * width;
-    builder_.box(pose * on_plan(x, -size_m.y() / 2 - 0.009, 0.05), {width - 0.012, 0.016, size_m.z() - 0.08}, wood(dark, random_.chance(0.5)));
+    builder_.box(pose * on_plan(x, -size_m.y() / 2 - 0.009, 0.05), {width - 0.012, 0.016, size_m.z() - 0.08},
+                 wood(dark, random_.chance(0.5)));
     builder_.box(pose * on_plan(x + (i % 2 ? -1 : 1) * (width / 2 - 0.05), -size_m.y() / 2 - 0.03, size_m.z() * 0.5),
                  {0.014, 0.025, 0.12}, plain(metal_));
   }
@@ -122,7 +139,8 @@ void Furnisher::desk(const SE3& pose, double width_m, double depth_m, double hei
   }
   builder_.box(pose * on_plan(width_m / 2 - 0.28, 0.02, 0.08), {0.4, depth_m - 0.15, height_m - 0.13}, plain(white_));
   for (int i = 0; i < 3; ++i) {
-    builder_.box(pose * on_plan(width_m / 2 - 0.28, -depth_m / 2 + 0.085, 0.1 + i * 0.19), {0.38, 0.02, 0.175}, plain(grey_));
+    builder_.box(pose * on_plan(width_m / 2 - 0.28, -depth_m / 2 + 0.085, 0.1 + i * 0.19), {0.38, 0.02, 0.175},
+                 plain(grey_));
   }
 }
 
@@ -134,12 +152,14 @@ void Furnisher::office_chair(const SE3& pose) {
   for (int i = 0; i < 5; ++i) {
     const SE3 spoke = pose * on_plan(0, 0, 0.06, 72.0 * i + 20);
     builder_.box(spoke * on_plan(0, -0.15), {0.045, 0.26, 0.035}, plain(black_));
-    builder_.lathe(spoke * on_plan(0, -0.26, -0.06), {{0.001, 0}, {0.026, 0.01}, {0.026, 0.045}, {0.001, 0.055}}, 8, plain(black_));
+    builder_.lathe(spoke * on_plan(0, -0.26, -0.06), {{0.001, 0}, {0.026, 0.01}, {0.026, 0.045}, {0.001, 0.055}}, 8,
+                   plain(black_));
   }
   // Seat and back are cushions: solids with rounded rims.
   builder_.box(pose * on_plan(0, 0, 0.40), {0.44, 0.43, 0.055}, cover);
   builder_.box(pose * on_plan(0, 0, 0.455), {0.40, 0.39, 0.012}, cover);
-  const SE3 back = pose * on_plan(0, 0.225, 0.55) * SE3(Eigen::Quaterniond(Eigen::AngleAxisd(-0.16, Eigen::Vector3d::UnitX())), {0, 0, 0});
+  const SE3 back = pose * on_plan(0, 0.225, 0.55) *
+                   SE3(Eigen::Quaterniond(Eigen::AngleAxisd(-0.16, Eigen::Vector3d::UnitX())), {0, 0, 0});
   builder_.box(back, {0.42, 0.05, 0.46}, cover);
   builder_.box(back * on_plan(0, -0.02, 0.03), {0.37, 0.05, 0.40}, cover);
   builder_.box(pose * on_plan(0, 0.235, 0.36), {0.06, 0.02, 0.28}, plain(black_));
@@ -154,7 +174,8 @@ void Furnisher::sofa(const SE3& pose, double width_m) {
   const Skin cover{fabric_[random_.below(3)], {0.4, 0.4}, {0, 0}, false};
   builder_.box(pose * on_plan(0, 0, 0.05), {width_m, 0.8, 0.25}, cover);
   builder_.box(pose * on_plan(0, 0.31, 0.28), {width_m - 0.1, 0.2, 0.52}, cover);
-  for (const double side : {-1.0, 1.0}) builder_.box(pose * on_plan(side * (width_m / 2 - 0.09), 0, 0.05), {0.18, 0.8, 0.54}, cover);
+  for (const double side : {-1.0, 1.0})
+    builder_.box(pose * on_plan(side * (width_m / 2 - 0.09), 0, 0.05), {0.18, 0.8, 0.54}, cover);
   const int seats = std::max(1, static_cast<int>(width_m / 0.7));
   const double part = (width_m - 0.4) / seats;
   for (int i = 0; i < seats; ++i) {
@@ -169,7 +190,11 @@ void Furnisher::sofa(const SE3& pose, double width_m) {
 void Furnisher::monitor(const SE3& pose, double width_m) {
   builder_.begin_mesh();
   const double height = width_m * 0.6;
-  const std::uint16_t screen = builder_.add_texture([s = random_.bits()] { return paint_screen({512, 320}, s); }, false);
+  const std::uint16_t screen = builder_.add_texture(
+      [s = random_.bits()] {
+        return paint_screen({512, 320}, s);
+      },
+      false);
   builder_.box(pose, {0.2, 0.16, 0.012}, plain(black_));
   builder_.box(pose * on_plan(0, 0.02, 0.01), {0.045, 0.03, 0.2}, plain(black_));
   const SE3 head = pose * on_plan(0, -0.01, 0.12);
@@ -184,20 +209,24 @@ void Furnisher::keyboard(const SE3& pose) {
   builder_.begin_mesh();
   const Skin top{keyboard_, {0, 0}, {0, 0}, false};
   builder_.box(pose, {0.42, 0.14, 0.02}, plain(black_), plain(black_), top);
-  builder_.box(pose * on_plan(0.29, random_.uniform(-0.02, 0.02), 0, random_.uniform(-15, 15)), {0.055, 0.1, 0.03}, plain(black_));
+  builder_.box(pose * on_plan(0.29, random_.uniform(-0.02, 0.02), 0, random_.uniform(-15, 15)), {0.055, 0.1, 0.03},
+               plain(black_));
 }
 
 void Furnisher::plant(const SE3& pose, double height_m) {
   builder_.begin_mesh();
   const double pot = height_m * 0.28, r = pot * 0.5;
-  builder_.lathe(pose, {{0.001, 0.001}, {r * 0.75, 0.001}, {r, pot}, {r * 1.06, pot}, {r * 0.9, pot * 0.97}, {0.001, pot * 0.9}}, 16, plain(terracotta_));
+  builder_.lathe(
+      pose, {{0.001, 0.001}, {r * 0.75, 0.001}, {r, pot}, {r * 1.06, pot}, {r * 0.9, pot * 0.97}, {0.001, pot * 0.9}},
+      16, plain(terracotta_));
   const int leaves = 14 + random_.below(12);
   for (int i = 0; i < leaves; ++i) {
     const double a = 2.399963 * i + random_.uniform(-0.3, 0.3), rise = random_.uniform(0.6, 2.4);
     const Eigen::Vector3d direction = Eigen::Vector3d(std::cos(a), std::sin(a), rise).normalized();
     const double length = (height_m - pot) * random_.uniform(0.5, 0.95);
     const Eigen::Vector3d root = pose * Eigen::Vector3d(0.3 * r * std::cos(a), 0.3 * r * std::sin(a), pot * 0.9);
-    builder_.leaf(root, direction, length, length * random_.uniform(0.16, 0.3), random_.uniform(0.3, 1.6), Skin{leaf_[random_.below(2)], {0, 0}, {0, 0}, false});
+    builder_.leaf(root, direction, length, length * random_.uniform(0.16, 0.3), random_.uniform(0.3, 1.6),
+                  Skin{leaf_[random_.below(2)], {0, 0}, {0, 0}, false});
   }
 }
 
@@ -214,7 +243,8 @@ void Furnisher::carton(const SE3& pose, const Eigen::Vector3d& size_m) {
 
 void Furnisher::mug(const SE3& pose) {
   const double r = random_.uniform(0.036, 0.045), h = random_.uniform(0.085, 0.11);
-  builder_.lathe(pose, {{r, 0}, {r, h}, {r * 0.88, h}, {r * 0.86, h * 0.25}, {0.001, h * 0.2}}, 16, Skin{label_[random_.below(4)], {0, 0}, {0, 0}, false});
+  builder_.lathe(pose, {{r, 0}, {r, h}, {r * 0.88, h}, {r * 0.86, h * 0.25}, {0.001, h * 0.2}}, 16,
+                 Skin{label_[random_.below(4)], {0, 0}, {0, 0}, false});
   std::vector<Eigen::Vector3d> handle;
   for (int i = 0; i <= 6; ++i) {
     const double a = -M_PI / 2 + M_PI * i / 6;
@@ -225,13 +255,14 @@ void Furnisher::mug(const SE3& pose) {
 
 void Furnisher::bin(const SE3& pose) {
   builder_.begin_mesh();
-  builder_.lathe(pose, {{0.001, 0.002}, {0.11, 0.002}, {0.14, 0.30}, {0.132, 0.30}, {0.10, 0.05}, {0.001, 0.05}}, 18, plain(grey_));
+  builder_.lathe(pose, {{0.001, 0.002}, {0.11, 0.002}, {0.14, 0.30}, {0.132, 0.30}, {0.10, 0.05}, {0.001, 0.05}}, 18,
+                 plain(grey_));
 }
 
 void Furnisher::curtain(const SE3& pose, double width_m, double height_m) {
   builder_.begin_mesh();
   constexpr int kFolds = 10;
-  const Skin cloth{fabric_[random_.below(3)], {0.35, 0.35}, {0, 0}, false};
+  const Skin cloth{fabric_[2], {0.35, 0.35}, {0, 0}, false};
   Eigen::Vector3d last;
   for (int i = 0; i <= kFolds; ++i) {
     const double depth = (i % 2 ? -0.05 : -0.015) + random_.uniform(-0.01, 0.01);
@@ -249,27 +280,34 @@ void Furnisher::wall_plate(const SE3& pose) {
 
 void Furnisher::bottle(const SE3& pose) {
   const double r = random_.uniform(0.03, 0.042), h = random_.uniform(0.2, 0.28);
-  builder_.lathe(pose, {{r, 0}, {r, h * 0.62}, {r * 0.4, h * 0.82}, {r * 0.36, h}, {0.001, h}}, 16, Skin{label_[random_.below(4)], {0, 0}, {0, 0}, false});
+  builder_.lathe(pose, {{r, 0}, {r, h * 0.62}, {r * 0.4, h * 0.82}, {r * 0.36, h}, {0.001, h}}, 16,
+                 Skin{label_[random_.below(4)], {0, 0}, {0, 0}, false});
 }
 
 void Furnisher::book_stack(const SE3& pose, int books) {
   double z = 0;
   for (int i = 0; i < books; ++i) {
-    const double thick = random_.uniform(0.015, 0.045), wide = random_.uniform(0.15, 0.24), deep = wide * random_.uniform(0.65, 0.75);
+    const double thick = random_.uniform(0.015, 0.045), wide = random_.uniform(0.15, 0.24),
+                 deep = wide * random_.uniform(0.65, 0.75);
     const int number = random_.below(kSpinesPerImage);
     const std::uint16_t image = spines_[random_.below(3)];
-    Skin spine = part_of(image, static_cast<double>(number) / kSpinesPerImage, 0, 1.0 / kSpinesPerImage, 1, thick, wide);
+    Skin spine =
+        part_of(image, static_cast<double>(number) / kSpinesPerImage, 0, 1.0 / kSpinesPerImage, 1, thick, wide);
     spine.turned = true;
-    const Skin cover = part_of(image, static_cast<double>(random_.below(kSpinesPerImage - 5)) / kSpinesPerImage, 0.1, 4.0 / kSpinesPerImage, 0.85, wide, deep);
-    builder_.box(pose * on_plan(0, 0, z, random_.uniform(-12, 12)), {wide, deep, thick}, plain(paper_edge_), spine, cover);
+    const Skin cover = part_of(image, static_cast<double>(random_.below(kSpinesPerImage - 5)) / kSpinesPerImage, 0.1,
+                               4.0 / kSpinesPerImage, 0.85, wide, deep);
+    builder_.box(pose * on_plan(0, 0, z, random_.uniform(-12, 12)), {wide, deep, thick}, plain(paper_edge_), spine,
+                 cover);
     z += thick + 0.0005;
   }
 }
 
 void Furnisher::pages(const SE3& pose, int sheets) {
   for (int i = 0; i < sheets; ++i) {
-    builder_.box(pose * on_plan(random_.uniform(-0.06, 0.06), random_.uniform(-0.05, 0.05), 0.0022 * i, random_.uniform(-40, 40)),
-                 {0.21, 0.297, 0.002}, plain(white_), plain(white_), Skin{page_[random_.below(3)], {0, 0}, {0, 0}, false});
+    builder_.box(pose * on_plan(random_.uniform(-0.06, 0.06), random_.uniform(-0.05, 0.05), 0.0022 * i,
+                                random_.uniform(-40, 40)),
+                 {0.21, 0.297, 0.002}, plain(white_), plain(white_),
+                 Skin{page_[random_.below(3)], {0, 0}, {0, 0}, false});
   }
 }
 
@@ -283,12 +321,25 @@ void Furnisher::clutter(const SE3& pose, double width_m, double depth_m, int thi
     const double y = -depth_m / 2 + (i / columns + random_.uniform(0.38, 0.62)) * cell_y;
     const SE3 here = pose * on_plan(x, y, 0, random_.uniform(-180, 180));
     switch (random_.below(6)) {
-      case 0: mug(here); break;
-      case 1: bottle(here); break;
-      case 2: book_stack(here, 1 + random_.below(4)); break;
-      case 3: pages(here, 1 + random_.below(3)); break;
-      case 4: carton(here, {random_.uniform(0.08, 0.18), random_.uniform(0.06, 0.14), random_.uniform(0.05, 0.16)}); break;
-      default: pages(here, 2); mug(here * on_plan(0.03, 0.02, 0.0045)); break;
+      case 0:
+        mug(here);
+        break;
+      case 1:
+        bottle(here);
+        break;
+      case 2:
+        book_stack(here, 1 + random_.below(4));
+        break;
+      case 3:
+        pages(here, 1 + random_.below(3));
+        break;
+      case 4:
+        carton(here, {random_.uniform(0.08, 0.18), random_.uniform(0.06, 0.14), random_.uniform(0.05, 0.16)});
+        break;
+      default:
+        pages(here, 2);
+        mug(here * on_plan(0.03, 0.02, 0.0045));
+        break;
     }
   }
 }
@@ -296,14 +347,23 @@ void Furnisher::clutter(const SE3& pose, double width_m, double depth_m, int thi
 void Furnisher::poster(const SE3& pose, double width_m, double height_m) {
   builder_.begin_mesh();
   const int width_px = std::clamp(static_cast<int>(width_m * 512), 128, 512);
-  const std::uint16_t image = builder_.add_texture([size = cv::Size(width_px, static_cast<int>(width_px * height_m / width_m)), s = random_.bits()] { return paint_poster(size, s); }, false);
-  builder_.box(pose * on_plan(0, -0.006), {width_m, 0.01, height_m}, plain(black_), Skin{image, {0, 0}, {0, 0}, false}, plain(black_), false);
+  const std::uint16_t image =
+      builder_.add_texture([size = cv::Size(width_px, static_cast<int>(width_px * height_m / width_m)),
+                            s = random_.bits()] { return paint_poster(size, s); },
+                           false);
+  builder_.box(pose * on_plan(0, -0.006), {width_m, 0.01, height_m}, plain(black_), Skin{image, {0, 0}, {0, 0}, false},
+               plain(black_), false);
 }
 
 void Furnisher::whiteboard(const SE3& pose, double width_m, double height_m) {
   builder_.begin_mesh();
-  const std::uint16_t image = builder_.add_texture([s = random_.bits()] { return paint_whiteboard({1024, 512}, s); }, false);
-  builder_.box(pose * on_plan(0, -0.01), {width_m, 0.018, height_m}, plain(metal_), Skin{image, {0, 0}, {0, 0}, false}, plain(metal_));
+  const std::uint16_t image = builder_.add_texture(
+      [s = random_.bits()] {
+        return paint_whiteboard({1024, 512}, s);
+      },
+      false);
+  builder_.box(pose * on_plan(0, -0.01), {width_m, 0.018, height_m}, plain(metal_), Skin{image, {0, 0}, {0, 0}, false},
+               plain(metal_));
   builder_.box(pose * on_plan(0, -0.045, -0.02), {width_m * 0.8, 0.06, 0.015}, plain(metal_));
 }
 

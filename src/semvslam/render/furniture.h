@@ -9,8 +9,8 @@
 
 namespace semvslam::render {
 
-/// Builds single pieces of furniture. Poses are world_from_piece: origin on the floor (or on what it stands on) under the
-/// piece's middle, front towards -y.
+/// Builds single pieces of furniture. Poses are world_from_piece: origin on the floor (or on what it stands on) under
+/// the piece's middle, front towards -y.
 class Furnisher {
  public:
   Furnisher(SceneBuilder& builder, std::uint64_t seed);
@@ -54,8 +54,8 @@ class Furnisher {
 
   SceneBuilder& builder_;
   RandomStream random_;
-  std::uint16_t dark_wood_, light_wood_, white_, black_, grey_, metal_, fabric_[3], leaf_[2], spines_[3], carton_[3], label_[4],
-      keyboard_, page_[3], terracotta_, paper_edge_;
+  std::uint16_t dark_wood_, light_wood_, white_, black_, grey_, metal_, fabric_[3], leaf_[2], spines_[3], carton_[3],
+      label_[4], keyboard_, page_[3], terracotta_, paper_edge_;
 };
 
 /// A pose on the floor plan: position, height and heading (turn about z).

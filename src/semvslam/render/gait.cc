@@ -32,11 +32,12 @@ Quaterniond about_x(double angle) { return Quaterniond(AngleAxisd(angle, Vector3
 Quaterniond about_y(double angle) { return Quaterniond(AngleAxisd(angle, Vector3d::UnitY())); }
 Quaterniond about_z(double angle) { return Quaterniond(AngleAxisd(angle, Vector3d::UnitZ())); }
 
-/// Upper arm: `swing` forward, `abduction` away from the body; forearm: `flexion`; all radians. `inward` turns the forearm
-/// towards the middle.
+/// Upper arm: `swing` forward, `abduction` away from the body; forearm: `flexion`; all radians. `inward` turns the
+/// forearm towards the middle.
 void set_arm(BodyPose& pose, int side, double swing, double abduction, double flexion, double inward = 0) {
   const bool right = side > 0;
-  pose.turns[right ? kUpperArmR : kUpperArmL] = about_x(swing) * about_z(side * inward) * about_y(side * (kArmRaise_rad - abduction));
+  pose.turns[right ? kUpperArmR : kUpperArmL] =
+      about_x(swing) * about_z(side * inward) * about_y(side * (kArmRaise_rad - abduction));
   const Vector3d elbow_axis(std::cos(kArmRaise_rad), 0, side * std::sin(kArmRaise_rad));
   pose.turns[right ? kForearmR : kForearmL] = Quaterniond(AngleAxisd(flexion, elbow_axis));
 }
@@ -47,7 +48,8 @@ void stand_on_floor(BodyPose& pose) {
   double lowest = 1e9;
   for (const int side : {1, -1}) {
     const BoneMotion& foot = motions[side > 0 ? kFootR : kFootL];
-    for (const Vector3d& p : {Vector3d(side * 0.115, -0.088, 0.004), Vector3d(side * 0.125, 0.10, 0), Vector3d(side * 0.128, 0.188, 0.004)}) {
+    for (const Vector3d& p : {Vector3d(side * 0.115, -0.088, 0.004), Vector3d(side * 0.125, 0.10, 0),
+                              Vector3d(side * 0.128, 0.188, 0.004)}) {
       lowest = std::min(lowest, (foot * p).z());
     }
   }
@@ -69,7 +71,8 @@ BodyPose walking_pose(double cycle, double vigour, ArmTask arms, double head_yaw
   for (const int side : {1, -1}) {
     const bool right = side > 0;
     const double own = right ? cycle : cycle + 0.5;
-    const double hip = vigour * curve(kHip_deg, own) + (1 - vigour) * 2.0, knee = vigour * curve(kKnee_deg, own) + (1 - vigour) * 4.0;
+    const double hip = vigour * curve(kHip_deg, own) + (1 - vigour) * 2.0,
+                 knee = vigour * curve(kKnee_deg, own) + (1 - vigour) * 4.0;
     const double ankle = vigour * curve(kAnkle_deg, own) + (1 - vigour) * 2.0;
     pose.turns[right ? kThighR : kThighL] = about_x(hip * kDegree) * about_y(side * (2.5 * kDegree) + list);
     pose.turns[right ? kShankR : kShankL] = about_x(-knee * kDegree);
@@ -80,7 +83,8 @@ BodyPose walking_pose(double cycle, double vigour, ArmTask arms, double head_yaw
       set_arm(pose, side, -10 * kDegree, 14 * kDegree, 8 * kDegree);
     } else {
       const double swing = -std::cos(2 * M_PI * own);  // against the leg of the same side
-      set_arm(pose, side, (-4 + 21 * vigour * swing + 4 * (1 - vigour)) * kDegree, 6 * kDegree, (14 + vigour * (10 + 12 * swing)) * kDegree, 0.1);
+      set_arm(pose, side, (-4 + 21 * vigour * swing + 4 * (1 - vigour)) * kDegree, 6 * kDegree,
+              (14 + vigour * (10 + 12 * swing)) * kDegree, 0.1);
     }
   }
   stand_on_floor(pose);
@@ -93,8 +97,10 @@ BodyPose sitting_pose(const SittingState& state, double seat_height_m) {
   const double recline = 4 * kDegree + state.torso_pitch_rad * 0.3;
   pose.pelvis = Vector3d(0, -0.03, seat_height_m + kFleshUnderPelvis_m);
   pose.turns[kPelvis] = about_x(recline);
-  pose.turns[kSpine] = about_z(0.4 * state.torso_yaw_rad) * about_x(0.4 * state.torso_pitch_rad - 3 * kDegree) * about_y(0.5 * state.torso_roll_rad);
-  pose.turns[kChest] = about_z(0.6 * state.torso_yaw_rad) * about_x(0.6 * state.torso_pitch_rad - 4 * kDegree) * about_y(0.5 * state.torso_roll_rad);
+  pose.turns[kSpine] = about_z(0.4 * state.torso_yaw_rad) * about_x(0.4 * state.torso_pitch_rad - 3 * kDegree) *
+                       about_y(0.5 * state.torso_roll_rad);
+  pose.turns[kChest] = about_z(0.6 * state.torso_yaw_rad) * about_x(0.6 * state.torso_pitch_rad - 4 * kDegree) *
+                       about_y(0.5 * state.torso_roll_rad);
   pose.turns[kNeck] = about_z(0.4 * state.head_yaw_rad) * about_x(-0.4 * state.head_pitch_rad);
   pose.turns[kHead] = about_z(0.6 * state.head_yaw_rad) * about_x(3 * kDegree - 0.6 * state.head_pitch_rad);
   // The thigh's slope that puts the soles on the floor with the shank upright.
@@ -106,7 +112,8 @@ BodyPose sitting_pose(const SittingState& state, double seat_height_m) {
     pose.turns[right ? kShankR : kShankL] = about_x(-(hip - (right ? 3 : -8) * kDegree));
     pose.turns[right ? kFootR : kFootL] = about_x((right ? -3 : 8) * kDegree);
     const double raised = state.arms[right ? 0 : 1];
-    set_arm(pose, side, (30 + 22 * raised) * kDegree, (12 + 8 * raised) * kDegree, (62 + 46 * raised) * kDegree, (0.35 - 0.2 * raised));
+    set_arm(pose, side, (30 + 22 * raised) * kDegree, (12 + 8 * raised) * kDegree, (62 + 46 * raised) * kDegree,
+            (0.35 - 0.2 * raised));
   }
   return pose;
 }

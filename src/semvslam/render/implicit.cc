@@ -17,7 +17,8 @@ float smooth_min(float a, float b, float k) {
 
 ImplicitShape& ImplicitShape::cone(const Eigen::Vector3f& a, float radius_a, const Eigen::Vector3f& b, float radius_b,
                                    float blend_m, const Eigen::Vector3f& flat, float flatness) {
-  Part part{Kind::kCone, false, std::max(blend_m, 1e-4f), a, b, {radius_a, radius_b, 0}, flat, flatness, Eigen::Quaternionf::Identity(), (a + b) / 2, 0};
+  Part part{Kind::kCone, false,    std::max(blend_m, 1e-4f),       a,           b, {radius_a, radius_b, 0},
+            flat,        flatness, Eigen::Quaternionf::Identity(), (a + b) / 2, 0};
   part.reach_m = (a - b).norm() / 2 + std::max(radius_a, radius_b) / std::min(1.f, flatness);
   parts_.push_back(part);
   return *this;
@@ -25,7 +26,8 @@ ImplicitShape& ImplicitShape::cone(const Eigen::Vector3f& a, float radius_a, con
 
 ImplicitShape& ImplicitShape::ellipsoid(const Eigen::Vector3f& centre, const Eigen::Vector3f& radii, float blend_m,
                                         const Eigen::Quaternionf& turn) {
-  parts_.push_back({Kind::kEllipsoid, false, std::max(blend_m, 1e-4f), centre, centre, radii, Eigen::Vector3f::Zero(), 1, turn, centre, radii.maxCoeff()});
+  parts_.push_back({Kind::kEllipsoid, false, std::max(blend_m, 1e-4f), centre, centre, radii, Eigen::Vector3f::Zero(),
+                    1, turn, centre, radii.maxCoeff()});
   return *this;
 }
 
@@ -92,8 +94,10 @@ Eigen::AlignedBox3f ImplicitShape::bounds() const {
   for (const Part& part : parts_) {
     if (part.carved) continue;
     Eigen::Vector3f reach = part.radii;
-    if (part.kind == Kind::kCone) reach = Eigen::Vector3f::Constant(std::max(part.radii.x(), part.radii.y()) / std::min(1.f, part.flatness));
-    if (part.kind == Kind::kEllipsoid && part.turn.w() < 0.9999f) reach = Eigen::Vector3f::Constant(part.radii.maxCoeff());
+    if (part.kind == Kind::kCone)
+      reach = Eigen::Vector3f::Constant(std::max(part.radii.x(), part.radii.y()) / std::min(1.f, part.flatness));
+    if (part.kind == Kind::kEllipsoid && part.turn.w() < 0.9999f)
+      reach = Eigen::Vector3f::Constant(part.radii.maxCoeff());
     for (const Eigen::Vector3f& p : {part.a, part.b}) {
       box.extend(Eigen::Vector3f(p - reach));
       box.extend(Eigen::Vector3f(p + reach));
@@ -150,7 +154,8 @@ Lattice sample(const ImplicitShape& shape, float cell_m) {
 bool cell_vertex(const Lattice& lattice, int x, int y, int z, Eigen::Vector3f& out) {
   float v[8];
   int inside = 0;
-  for (int c = 0; c < 8; ++c) inside += (v[c] = lattice.values[lattice.index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))]) < 0;
+  for (int c = 0; c < 8; ++c)
+    inside += (v[c] = lattice.values[lattice.index(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))]) < 0;
   if (inside == 0 || inside == 8) return false;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   int count = 0;

@@ -13,8 +13,8 @@ namespace semvslam::render {
 /// Solids and smooth minimum after I. Quilez, "Distance functions" (formulas).
 class ImplicitShape {
  public:
-  /// A round cone from `a` to `b`. @param flat, flatness distances along unit vector `flat` count `flatness` times: > 1 makes
-  /// the cross-section an ellipse that is thin there.
+  /// A round cone from `a` to `b`. @param flat, flatness distances along unit vector `flat` count `flatness` times: > 1
+  /// makes the cross-section an ellipse that is thin there.
   ImplicitShape& cone(const Eigen::Vector3f& a, float radius_a, const Eigen::Vector3f& b, float radius_b, float blend_m,
                       const Eigen::Vector3f& flat = Eigen::Vector3f::Zero(), float flatness = 1.f);
   ImplicitShape& ellipsoid(const Eigen::Vector3f& centre, const Eigen::Vector3f& radii, float blend_m,

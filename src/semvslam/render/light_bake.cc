@@ -9,9 +9,9 @@ namespace semvslam::render {
 namespace {
 
 constexpr int kLeafFaces = 4;
-constexpr float kLift_m = 0.012f;        // rays start above the surface: rugs and skirting do not blacken what they lie on
+constexpr float kLift_m = 0.012f;  // rays start above the surface: rugs and skirting do not blacken what they lie on
 constexpr float kAmbientReach_m = 0.7f;
-constexpr float kAmbient = 0.46f, kBounce = 0.12f;
+constexpr float kAmbient = 0.56f, kBounce = 0.14f;
 constexpr int kAmbientRays = 8;
 
 float brightness(const Colour4& c) { return 0.11f * c[0] + 0.59f * c[1] + 0.30f * c[2]; }
@@ -23,7 +23,8 @@ ShadowTester::ShadowTester(const std::vector<Mesh>& meshes) {
     for (const Triangle& t : mesh.triangles) {
       if (t.lighting == Lighting::kEmissive) continue;  // lamps do not shade themselves
       const Eigen::Vector3f a = mesh.vertices[t.corners[0].vertex].cast<float>();
-      faces_.push_back({a, mesh.vertices[t.corners[1].vertex].cast<float>() - a, mesh.vertices[t.corners[2].vertex].cast<float>() - a});
+      faces_.push_back({a, mesh.vertices[t.corners[1].vertex].cast<float>() - a,
+                        mesh.vertices[t.corners[2].vertex].cast<float>() - a});
     }
   }
   nodes_.reserve(faces_.size());
@@ -37,7 +38,8 @@ void ShadowTester::build(std::int32_t index, int depth) {
   Eigen::Vector3f low = Eigen::Vector3f::Constant(1e9f), high = -low, centre_low = low, centre_high = high;
   for (std::int32_t i = first; i < first + count; ++i) {
     const Face& f = faces_[i];
-    const Eigen::Vector3f b = f.corner + f.edge_1, c = f.corner + f.edge_2, centre = f.corner + (f.edge_1 + f.edge_2) / 3;
+    const Eigen::Vector3f b = f.corner + f.edge_1, c = f.corner + f.edge_2,
+                          centre = f.corner + (f.edge_1 + f.edge_2) / 3;
     low = low.cwiseMin(f.corner).cwiseMin(b).cwiseMin(c);
     high = high.cwiseMax(f.corner).cwiseMax(b).cwiseMax(c);
     centre_low = centre_low.cwiseMin(centre);
@@ -64,7 +66,8 @@ void ShadowTester::build(std::int32_t index, int depth) {
 }
 
 /// Moeller and Trumbore 1997; both sides count.
-bool ShadowTester::hit(const Face& face, const Eigen::Vector3f& from, const Eigen::Vector3f& direction, float reach_m) const {
+bool ShadowTester::hit(const Face& face, const Eigen::Vector3f& from, const Eigen::Vector3f& direction,
+                       float reach_m) const {
   const Eigen::Vector3f p = direction.cross(face.edge_2);
   const float determinant = face.edge_1.dot(p);
   if (std::abs(determinant) < 1e-9f) return false;
@@ -81,8 +84,9 @@ bool ShadowTester::hit(const Face& face, const Eigen::Vector3f& from, const Eige
 
 bool ShadowTester::blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& direction, float reach_m) const {
   if (faces_.empty()) return false;
-  const Eigen::Array3f inverse = direction.array().cwiseAbs().max(1e-9f).inverse() *
-                                 (direction.array() < 0.f).select(Eigen::Array3f::Constant(-1.f), Eigen::Array3f::Constant(1.f));
+  const Eigen::Array3f inverse =
+      direction.array().cwiseAbs().max(1e-9f).inverse() *
+      (direction.array() < 0.f).select(Eigen::Array3f::Constant(-1.f), Eigen::Array3f::Constant(1.f));
   std::int32_t stack[64];
   int size = 0;
   stack[size++] = 0;
@@ -109,12 +113,13 @@ LightModel::LightModel(const std::vector<AreaLight>& lights) {
     hemisphere_.emplace_back(std::sqrt(r2) * std::cos(angle), std::sqrt(r2) * std::sin(angle), std::sqrt(1 - r2));
   }
   for (const AreaLight& l : lights) {
-    sources_.push_back({l.centre.cast<float>(), l.half_u.cast<float>(), l.half_v.cast<float>(), l.normal.cast<float>(), l.radiance.cast<float>(),
-                        static_cast<float>(4 * l.half_u.norm() * l.half_v.norm())});
+    sources_.push_back({l.centre.cast<float>(), l.half_u.cast<float>(), l.half_v.cast<float>(), l.normal.cast<float>(),
+                        l.radiance.cast<float>(), static_cast<float>(4 * l.half_u.norm() * l.half_v.norm())});
   }
 }
 
-Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& normal_d, const ShadowTester* tester) const {
+Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& normal_d,
+                       const ShadowTester* tester) const {
   const Eigen::Vector3f normal = normal_d.cast<float>(), lifted = position.cast<float>() + normal * kLift_m;
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   constexpr float kPlaces[4][2] = {{-0.6f, -0.3f}, {0.6f, 0.4f}, {0.3f, -0.7f}, {-0.3f, 0.6f}};
@@ -129,7 +134,8 @@ Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& n
       const Eigen::Vector3f direction = to / distance;
       const float facing = normal.dot(direction), leaving = -light.normal.dot(direction);
       if (facing <= 0 || leaving <= 0) continue;
-      const float strength = facing * leaving * light.area_m2 / (static_cast<float>(places * M_PI) * (distance * distance + 0.2f));
+      const float strength =
+          facing * leaving * light.area_m2 / (static_cast<float>(places * M_PI) * (distance * distance + 0.2f));
       if (strength * static_cast<float>(places) < 2e-3f) continue;
       if (tester && tester->blocked(lifted, direction, distance - 0.02f)) continue;
       sum += strength * light.radiance;
@@ -144,7 +150,7 @@ Colour4 LightModel::at(const Eigen::Vector3d& position, const Eigen::Vector3d& n
     }
     open = static_cast<float>(free) / kAmbientRays;
   }
-  const float ambient = kBounce + kAmbient * open * (0.8f + 0.2f * normal.z());
+  const float ambient = kBounce + kAmbient * open;
   Colour4 out{};
   const float tint[3] = {0.97f, 1.0f, 1.02f};
   for (int c = 0; c < 3; ++c) out[c] = std::sqrt(tint[c] * ambient + sum[c]);

@@ -20,7 +20,7 @@ class ShadowTester {
  private:
   struct Node {
     Eigen::Vector3f low = Eigen::Vector3f::Zero(), high = Eigen::Vector3f::Zero();
-    std::int32_t left = -1;          // the right child follows it; -1 = leaf
+    std::int32_t left = -1;  // the right child follows it; -1 = leaf
     std::int32_t first = 0, count = 0;
   };
   struct Face {

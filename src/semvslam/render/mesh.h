@@ -33,7 +33,7 @@ struct Triangle {
 struct Mesh {
   std::vector<Eigen::Vector3d> vertices;  // world frame, metres
   std::vector<Triangle> triangles;
-  std::uint8_t role = 0;                  // 0 = room, else 1 + index of the role
+  std::uint8_t role = 0;  // 0 = room, else 1 + index of the role
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius_m = 0;  // of a sphere around `centre` that holds everything
 

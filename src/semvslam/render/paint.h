@@ -11,7 +11,8 @@ namespace semvslam::render {
 
 // --- surfaces of the room (paint_surfaces.cc) ---
 
-/// Wooden boards along x: tone per board, grain, pores, gaps. @param boards number across y; 1 = one piece without gaps.
+/// Wooden boards along x: tone per board, grain, pores, gaps. @param boards number across y; 1 = one piece without
+/// gaps.
 cv::Mat paint_wood(cv::Size size, const cv::Vec3f& tone, int boards, std::uint32_t seed);
 /// Painted wall with trowel marks, stains and specks.
 cv::Mat paint_plaster(cv::Size size, const cv::Vec3f& tone, float roughness, std::uint32_t seed);

@@ -13,17 +13,19 @@ cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
 
 /// What printed things look like: warm and muted tones more often than pure ones.
 cv::Scalar any_colour(RandomStream& random, double saturation, double low, double high) {
-  const double kind = random.uniform(), strength = saturation * random.uniform(0.4, 1.0), value = random.uniform(low, high);
-  if (kind < 0.2) return scalar(hue_colour(0.1, 0.12 * saturation, value));                                 // grey, paper
-  if (kind < 0.55) return scalar(hue_colour(std::fmod(1.02 + 0.05 * random.normal(), 1.0), strength, value));  // red to ochre
-  if (kind < 0.75) return scalar(hue_colour(0.6 + 0.04 * random.normal(), 0.8 * strength, value));             // blue
+  const double kind = random.uniform(), strength = saturation * random.uniform(0.4, 1.0),
+               value = random.uniform(low, high);
+  if (kind < 0.2) return scalar(hue_colour(0.1, 0.12 * saturation, value));  // grey, paper
+  if (kind < 0.55)
+    return scalar(hue_colour(std::fmod(1.02 + 0.05 * random.normal(), 1.0), strength, value));      // red to ochre
+  if (kind < 0.75) return scalar(hue_colour(0.6 + 0.04 * random.normal(), 0.8 * strength, value));  // blue
   return scalar(hue_colour(random.uniform(), 0.75 * strength, value));
 }
 
 /// A word of random letters; syllables, so that word shapes look like writing.
 std::string word(RandomStream& random) {
-  static const char* const kSyllables[] = {"ka", "lo", "ven", "ta", "ri", "mo", "sel", "du", "on", "pra",
-                                           "ne", "ti", "gar", "el", "sto", "fi", "ba", "rum", "ol", "ce"};
+  static const char* const kSyllables[] = {"ka", "lo", "ven", "ta", "ri",  "mo", "sel", "du",  "on", "pra",
+                                           "ne", "ti", "gar", "el", "sto", "fi", "ba",  "rum", "ol", "ce"};
   std::string text;
   const int parts = 1 + random.below(3);
   for (int i = 0; i < parts; ++i) text += kSyllables[random.below(20)];
@@ -63,7 +65,8 @@ void add_grain(cv::Mat& image, float strength, std::uint32_t seed) {
 
 void paint_landscape(cv::Mat& image, RandomStream& random) {
   const int w = image.cols, h = image.rows;
-  const cv::Vec3f high = hue_colour(random.uniform(0.5, 0.7), 0.6, 0.8), low = hue_colour(random.uniform(0.0, 0.15), 0.35, 0.95);
+  const cv::Vec3f high = hue_colour(random.uniform(0.5, 0.7), 0.6, 0.8),
+                  low = hue_colour(random.uniform(0.0, 0.15), 0.35, 0.95);
   for (int y = 0; y < h; ++y) {
     const float a = static_cast<float>(y) / static_cast<float>(h);
     image.row(y).setTo(scalar(high * (1.f - a) + low * a));
@@ -86,7 +89,8 @@ void paint_landscape(cv::Mat& image, RandomStream& random) {
     const cv::Point foot(random.below(w), static_cast<int>(h * random.uniform(0.75, 1.0)));
     const int t = std::max(3, static_cast<int>(h * random.uniform(0.04, 0.14)));
     const std::vector<cv::Point> tree{{foot.x - t / 3, foot.y}, {foot.x + t / 3, foot.y}, {foot.x, foot.y - t}};
-    cv::fillConvexPoly(image, tree, scalar(hue_colour(random.uniform(0.25, 0.42), 0.6, random.uniform(0.15, 0.45))), cv::LINE_AA);
+    cv::fillConvexPoly(image, tree, scalar(hue_colour(random.uniform(0.25, 0.42), 0.6, random.uniform(0.15, 0.45))),
+                       cv::LINE_AA);
   }
 }
 
@@ -98,9 +102,15 @@ void paint_shapes(cv::Mat& image, RandomStream& random) {
     const int r = std::max(2, static_cast<int>(w * random.uniform(0.02, 0.22) * random.uniform()));
     const cv::Scalar c = any_colour(random, 0.9, 0.15, 0.95);
     switch (random.below(4)) {
-      case 0: cv::circle(image, at, r, c, random.chance(0.3) ? std::max(1, r / 5) : cv::FILLED, cv::LINE_AA); break;
-      case 1: cv::rectangle(image, {at.x - r, at.y - r / 2, 2 * r, r}, c, cv::FILLED); break;
-      case 2: cv::line(image, at, {random.below(w), random.below(h)}, c, 1 + r / 6, cv::LINE_AA); break;
+      case 0:
+        cv::circle(image, at, r, c, random.chance(0.3) ? std::max(1, r / 5) : cv::FILLED, cv::LINE_AA);
+        break;
+      case 1:
+        cv::rectangle(image, {at.x - r, at.y - r / 2, 2 * r, r}, c, cv::FILLED);
+        break;
+      case 2:
+        cv::line(image, at, {random.below(w), random.below(h)}, c, 1 + r / 6, cv::LINE_AA);
+        break;
       default: {
         const std::vector<cv::Point> p{{at.x - r, at.y + r}, {at.x + r, at.y + r / 2}, {at.x + r / 4, at.y - r}};
         cv::fillConvexPoly(image, p, c, cv::LINE_AA);
@@ -121,8 +131,10 @@ cv::Mat paint_poster(cv::Size size, std::uint64_t seed) {
   if (kind == 2) {
     image.setTo(any_colour(random, 0.6, 0.2, 0.95));
     cv::Mat picture = image({w / 12, h / 5, w * 10 / 12, h / 2});
-    if (random.chance(0.5)) paint_landscape(picture, random);
-    else paint_shapes(picture, random);
+    if (random.chance(0.5))
+      paint_landscape(picture, random);
+    else
+      paint_shapes(picture, random);
     const cv::Scalar ink = any_colour(random, 0.5, 0.05, 0.3);
     cv::putText(image, word(random) + " " + word(random), {w / 12, h / 7}, cv::FONT_HERSHEY_DUPLEX, w / 260.0, ink,
                 std::max(1, w / 120), cv::LINE_AA);
@@ -150,7 +162,8 @@ cv::Mat paint_spines(cv::Size size, int count, std::uint64_t seed) {
       cv::rectangle(spine, {x, 0, 2 + random.below(h / 8), w}, any_colour(random, 0.8, 0.1, 0.95), cv::FILLED);
     }
     const double scale = w / 34.0;
-    cv::putText(spine, word(random) + " " + word(random), {h / 8, w * 2 / 3}, random.chance(0.5) ? cv::FONT_HERSHEY_DUPLEX : cv::FONT_HERSHEY_TRIPLEX,
+    cv::putText(spine, word(random) + " " + word(random), {h / 8, w * 2 / 3},
+                random.chance(0.5) ? cv::FONT_HERSHEY_DUPLEX : cv::FONT_HERSHEY_TRIPLEX,
                 scale * random.uniform(0.6, 1.0), ink, 1, cv::LINE_AA);
     for (int r = 0; r < w; ++r) {  // rounded back: darker to both sides
       const double side = 2.0 * (r + 0.5) / w - 1.0;
@@ -172,10 +185,12 @@ cv::Mat paint_screen(cv::Size size, std::uint64_t seed) {
   const int windows = 2 + random.below(3);
   for (int i = 0; i < windows; ++i) {
     const bool dark = random.chance(0.5);
-    const cv::Rect area(random.below(w / 2), h / 20 + random.below(h / 3), w / 3 + random.below(w / 4), h / 3 + random.below(h / 4));
+    const cv::Rect area(random.below(w / 2), h / 20 + random.below(h / 3), w / 3 + random.below(w / 4),
+                        h / 3 + random.below(h / 4));
     const cv::Rect in = area & cv::Rect(0, 0, w, h);
     cv::rectangle(image, in, dark ? cv::Scalar(42, 36, 34) : cv::Scalar(238, 240, 240), cv::FILLED);
-    cv::rectangle(image, {in.x, in.y, in.width, h / 28}, dark ? cv::Scalar(80, 70, 60) : cv::Scalar(205, 180, 150), cv::FILLED);
+    cv::rectangle(image, {in.x, in.y, in.width, h / 28}, dark ? cv::Scalar(80, 70, 60) : cv::Scalar(205, 180, 150),
+                  cv::FILLED);
     const cv::Rect inner(in.x + 6, in.y + h / 24, in.width - 12, in.height - h / 20);
     if (random.chance(0.3)) {  // a plot
       for (int k = 0; k < 3; ++k) {
@@ -208,17 +223,20 @@ cv::Mat paint_page(cv::Size size, std::uint64_t seed) {
   RandomStream random(seed);
   cv::Mat image(size, CV_8UC3, cv::Scalar(232, 238, 240));
   const int w = size.width, h = size.height, line = std::max(7, h / 40);
-  cv::putText(image, word(random) + " " + word(random), {w / 10, h / 9}, cv::FONT_HERSHEY_DUPLEX, w / 420.0, {30, 25, 25}, 1 + w / 300, cv::LINE_AA);
+  cv::putText(image, word(random) + " " + word(random), {w / 10, h / 9}, cv::FONT_HERSHEY_DUPLEX, w / 420.0,
+              {30, 25, 25}, 1 + w / 300, cv::LINE_AA);
   const int columns = 1 + random.below(2);
   for (int c = 0; c < columns; ++c) {
-    write_block(image, {w / 10 + c * w * 8 / 10 / columns, h / 7, w * 8 / 10 / columns - w / 30, h * 5 / 7}, line, {50, 45, 45}, random);
+    write_block(image, {w / 10 + c * w * 8 / 10 / columns, h / 7, w * 8 / 10 / columns - w / 30, h * 5 / 7}, line,
+                {50, 45, 45}, random);
   }
   cv::Mat figure = image({w / 5 + random.below(w / 8), h / 3 + random.below(h / 5), w * 2 / 5, h / 5});
   paint_shapes(figure, random);
   const cv::Scalar pen = any_colour(random, 1.0, 0.4, 0.8);
   for (int i = 0; i < 3; ++i) {
-    cv::ellipse(image, {random.below(w), random.below(h)}, {w / 12 + random.below(w / 10), h / 30 + random.below(h / 20)},
-                random.uniform(-20, 20), 0, 330, pen, 2, cv::LINE_AA);
+    cv::ellipse(image, {random.below(w), random.below(h)},
+                {w / 12 + random.below(w / 10), h / 30 + random.below(h / 20)}, random.uniform(-20, 20), 0, 330, pen, 2,
+                cv::LINE_AA);
   }
   add_grain(image, 0.1f, random.bits32());
   return image;
@@ -229,21 +247,26 @@ cv::Mat paint_whiteboard(cv::Size size, std::uint64_t seed) {
   cv::Mat image(size, CV_8UC3, cv::Scalar(228, 230, 228));
   const int w = size.width, h = size.height;
   for (int i = 0; i < 25; ++i) {  // wiped remains
-    cv::line(image, {random.below(w), random.below(h)}, {random.below(w), random.below(h)}, cv::Scalar(214, 216, 216), 6 + random.below(18), cv::LINE_AA);
+    cv::line(image, {random.below(w), random.below(h)}, {random.below(w), random.below(h)}, cv::Scalar(214, 216, 216),
+             6 + random.below(18), cv::LINE_AA);
   }
   const cv::Scalar pens[] = {{120, 40, 20}, {30, 30, 170}, {40, 35, 30}, {50, 110, 30}};
   for (int i = 0; i < 9; ++i) {
     const cv::Scalar pen = pens[random.below(4)];
-    const cv::Rect area(random.below(w * 3 / 4), random.below(h * 3 / 4), w / 6 + random.below(w / 8), h / 8 + random.below(h / 8));
+    const cv::Rect area(random.below(w * 3 / 4), random.below(h * 3 / 4), w / 6 + random.below(w / 8),
+                        h / 8 + random.below(h / 8));
     const int kind = random.below(3);
     if (kind == 0) write_block(image, area, std::max(10, h / 16), pen, random);
     if (kind == 1) {
       cv::rectangle(image, area, pen, 2, cv::LINE_AA);
-      cv::putText(image, word(random), {area.x + 6, area.y + area.height / 2}, cv::FONT_HERSHEY_SCRIPT_SIMPLEX, h / 380.0, pen, 1, cv::LINE_AA);
-      cv::arrowedLine(image, {area.x + area.width, area.y + area.height / 2}, {area.x + area.width + w / 12, area.y + random.below(h / 5)}, pen, 2, cv::LINE_AA);
+      cv::putText(image, word(random), {area.x + 6, area.y + area.height / 2}, cv::FONT_HERSHEY_SCRIPT_SIMPLEX,
+                  h / 380.0, pen, 1, cv::LINE_AA);
+      cv::arrowedLine(image, {area.x + area.width, area.y + area.height / 2},
+                      {area.x + area.width + w / 12, area.y + random.below(h / 5)}, pen, 2, cv::LINE_AA);
     }
     if (kind == 2) {
-      cv::arrowedLine(image, {area.x, area.y + area.height}, {area.x + area.width, area.y + area.height}, pen, 2, cv::LINE_AA, 0, 0.05);
+      cv::arrowedLine(image, {area.x, area.y + area.height}, {area.x + area.width, area.y + area.height}, pen, 2,
+                      cv::LINE_AA, 0, 0.05);
       cv::arrowedLine(image, {area.x, area.y + area.height}, area.tl(), pen, 2, cv::LINE_AA, 0, 0.08);
       const double k = random.uniform(1, 4);
       for (int x = 0; x < area.width; x += 3) {
@@ -272,17 +295,22 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
       const float cloud = fractal_noise(static_cast<float>(x) * 0.008f, static_cast<float>(y) * 0.018f, s, 4096, 5);
       const float a = smooth_step(0.45f, 0.7f, cloud), t = static_cast<float>(y) / static_cast<float>(h);
       const cv::Vec3f c = cv::Vec3f(250, 215 + 25 * t, 170 + 60 * t) * (1.f - a) + cv::Vec3f(252, 250, 248) * a;
-      image.at<cv::Vec3b>(y, x) = cv::Vec3b(cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]), cv::saturate_cast<std::uint8_t>(c[2]));
+      image.at<cv::Vec3b>(y, x) =
+          cv::Vec3b(cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]),
+                    cv::saturate_cast<std::uint8_t>(c[2]));
     }
   }
   for (int i = 0; i < 6; ++i) {  // houses
-    const int bw = w / 8 + random.below(w / 8), bh = h / 4 + random.below(h / 4), x = random.below(w) - bw / 2, y = h - bh;
+    const int bw = w / 8 + random.below(w / 8), bh = h / 4 + random.below(h / 4), x = random.below(w) - bw / 2,
+              y = h - bh;
     cv::rectangle(image, {x, y, bw, bh}, any_colour(random, 0.35, 0.55, 0.85), cv::FILLED);
     const cv::Scalar roof = scalar(hue_colour(random.uniform(0.0, 0.06), 0.6, random.uniform(0.35, 0.6)));
-    cv::fillConvexPoly(image, std::vector<cv::Point>{{x - 4, y}, {x + bw + 4, y}, {x + bw / 2, y - bh / 4}}, roof, cv::LINE_AA);
+    cv::fillConvexPoly(image, std::vector<cv::Point>{{x - 4, y}, {x + bw + 4, y}, {x + bw / 2, y - bh / 4}}, roof,
+                       cv::LINE_AA);
     for (int r = 0; r < 4; ++r) {
       for (int c = 0; c < 4; ++c) {
-        cv::rectangle(image, {x + bw * (2 * c + 1) / 9, y + bh * (2 * r + 1) / 9, bw / 10, bh / 10}, cv::Scalar(110 + random.below(60), 90, 70), cv::FILLED);
+        cv::rectangle(image, {x + bw * (2 * c + 1) / 9, y + bh * (2 * r + 1) / 9, bw / 10, bh / 10},
+                      cv::Scalar(110 + random.below(60), 90, 70), cv::FILLED);
       }
     }
   }
@@ -290,7 +318,8 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
     const int r = 2 + random.below(w / 50);
     const double x = random.uniform() * w, crown = 0.62 + 0.18 * std::sin(x * 0.02) + 0.1 * std::sin(x * 0.053);
     cv::circle(image, {static_cast<int>(x), static_cast<int>(h * random.uniform(crown, 1.05))}, r,
-               scalar(hue_colour(random.uniform(0.2, 0.36), random.uniform(0.35, 0.7), random.uniform(0.25, 0.7))), cv::FILLED, cv::LINE_AA);
+               scalar(hue_colour(random.uniform(0.2, 0.36), random.uniform(0.35, 0.7), random.uniform(0.25, 0.7))),
+               cv::FILLED, cv::LINE_AA);
   }
   return image;
 }
@@ -301,7 +330,8 @@ cv::Mat paint_cardboard(cv::Size size, std::uint64_t seed) {
   const int w = size.width, h = size.height;
   for (int y = 0; y < h; y += 4) cv::line(image, {0, y}, {w, y}, cv::Scalar(90, 132, 170), 1);
   cv::rectangle(image, {w * 9 / 20, 0, w / 10, h}, cv::Scalar(120, 165, 200), cv::FILLED);
-  cv::putText(image, word(random), {w / 12, h / 3}, cv::FONT_HERSHEY_DUPLEX, w / 220.0, {40, 50, 70}, std::max(1, w / 100), cv::LINE_AA);
+  cv::putText(image, word(random), {w / 12, h / 3}, cv::FONT_HERSHEY_DUPLEX, w / 220.0, {40, 50, 70},
+              std::max(1, w / 100), cv::LINE_AA);
   write_block(image, {w / 12, h / 2, w / 3, h / 3}, std::max(8, h / 18), {50, 60, 80}, random);
   cv::rectangle(image, {w * 6 / 10, h / 2, w / 4, h / 4}, cv::Scalar(225, 230, 232), cv::FILLED);
   for (int x = 0; x < w / 4 - 6; x += 3) {
@@ -338,7 +368,8 @@ cv::Mat paint_keyboard(cv::Size size, std::uint64_t seed) {
       const cv::Rect area(x, key / 2 + r * key, std::min(width, size.width - key / 2 - x) - 2, key - 2);
       cv::rectangle(image, area, dark ? cv::Scalar(62, 58, 56) : cv::Scalar(228, 230, 230), cv::FILLED);
       const std::string letter(1, static_cast<char>('A' + random.below(26)));
-      cv::putText(image, letter, {area.x + 2, area.y + area.height - 3}, cv::FONT_HERSHEY_PLAIN, key / 22.0, dark ? cv::Scalar(210, 210, 210) : cv::Scalar(60, 60, 60), 1, cv::LINE_AA);
+      cv::putText(image, letter, {area.x + 2, area.y + area.height - 3}, cv::FONT_HERSHEY_PLAIN, key / 22.0,
+                  dark ? cv::Scalar(210, 210, 210) : cv::Scalar(60, 60, 60), 1, cv::LINE_AA);
       x += width;
     }
   }
@@ -354,7 +385,8 @@ cv::Mat paint_label(cv::Size size, std::uint64_t seed) {
   for (int i = 0; i < 2; ++i) {
     const int x = i * w / 2;
     cv::circle(image, {x + w / 4, h / 2}, h / 5, any_colour(random, 0.9, 0.3, 1.0), cv::FILLED, cv::LINE_AA);
-    cv::putText(image, word(random), {x + w / 14, h * 9 / 16}, cv::FONT_HERSHEY_DUPLEX, w / 330.0, any_colour(random, 0.4, 0.0, 0.3), 2, cv::LINE_AA);
+    cv::putText(image, word(random), {x + w / 14, h * 9 / 16}, cv::FONT_HERSHEY_DUPLEX, w / 330.0,
+                any_colour(random, 0.4, 0.0, 0.3), 2, cv::LINE_AA);
   }
   add_grain(image, 0.15f, random.bits32());
   return image;

@@ -13,14 +13,18 @@ cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
 
 /// Blends a colour into an image through a soft ellipse. Centre and radii in pixels; strength 0..1.
 void soften(cv::Mat& image, cv::Point2f centre, cv::Size2f radii, const cv::Vec3f& colour, float strength) {
-  const int x0 = std::max(0, static_cast<int>(centre.x - 2 * radii.width)), x1 = std::min(image.cols - 1, static_cast<int>(centre.x + 2 * radii.width));
-  const int y0 = std::max(0, static_cast<int>(centre.y - 2 * radii.height)), y1 = std::min(image.rows - 1, static_cast<int>(centre.y + 2 * radii.height));
+  const int x0 = std::max(0, static_cast<int>(centre.x - 2 * radii.width)),
+            x1 = std::min(image.cols - 1, static_cast<int>(centre.x + 2 * radii.width));
+  const int y0 = std::max(0, static_cast<int>(centre.y - 2 * radii.height)),
+            y1 = std::min(image.rows - 1, static_cast<int>(centre.y + 2 * radii.height));
   for (int y = y0; y <= y1; ++y) {
     for (int x = x0; x <= x1; ++x) {
-      const float dx = (static_cast<float>(x) - centre.x) / radii.width, dy = (static_cast<float>(y) - centre.y) / radii.height;
+      const float dx = (static_cast<float>(x) - centre.x) / radii.width,
+                  dy = (static_cast<float>(y) - centre.y) / radii.height;
       const float a = strength * std::exp(-1.2f * (dx * dx + dy * dy));
       auto& pixel = image.at<cv::Vec3b>(y, x);
-      for (int c = 0; c < 3; ++c) pixel[c] = cv::saturate_cast<std::uint8_t>(static_cast<float>(pixel[c]) * (1 - a) + colour[c] * a);
+      for (int c = 0; c < 3; ++c)
+        pixel[c] = cv::saturate_cast<std::uint8_t>(static_cast<float>(pixel[c]) * (1 - a) + colour[c] * a);
     }
   }
 }
@@ -29,8 +33,11 @@ void mottle(cv::Mat& image, float strength, std::uint32_t seed, float frequency)
   for (int y = 0; y < image.rows; ++y) {
     auto* row = image.ptr<cv::Vec3b>(y);
     for (int x = 0; x < image.cols; ++x) {
-      const float n = fractal_noise(static_cast<float>(x) * frequency, static_cast<float>(y) * frequency, seed, 1024, 3) - 0.5f;
-      for (int c = 0; c < 3; ++c) row[x][c] = cv::saturate_cast<std::uint8_t>(static_cast<float>(row[x][c]) * (1.f + strength * n * (c == 2 ? 0.7f : 1.f)));
+      const float n =
+          fractal_noise(static_cast<float>(x) * frequency, static_cast<float>(y) * frequency, seed, 1024, 3) - 0.5f;
+      for (int c = 0; c < 3; ++c)
+        row[x][c] = cv::saturate_cast<std::uint8_t>(static_cast<float>(row[x][c]) *
+                                                    (1.f + strength * n * (c == 2 ? 0.7f : 1.f)));
     }
   }
 }
@@ -45,10 +52,13 @@ struct FaceFrame {
 
 constexpr int kShift = 4;  // sub-pixel bits of OpenCV's drawing
 
-cv::Point fixed(cv::Point2f p) { return {static_cast<int>(std::lround(p.x * 16)), static_cast<int>(std::lround(p.y * 16))}; }
+cv::Point fixed(cv::Point2f p) {
+  return {static_cast<int>(std::lround(p.x * 16)), static_cast<int>(std::lround(p.y * 16))};
+}
 
 void ellipse(cv::Mat& image, cv::Point2f centre, float rx, float ry, double angle_deg, const cv::Scalar& colour) {
-  cv::ellipse(image, fixed(centre), {static_cast<int>(rx * 16), static_cast<int>(ry * 16)}, angle_deg, 0, 360, colour, cv::FILLED, cv::LINE_AA, kShift);
+  cv::ellipse(image, fixed(centre), {static_cast<int>(rx * 16), static_cast<int>(ry * 16)}, angle_deg, 0, 360, colour,
+              cv::FILLED, cv::LINE_AA, kShift);
 }
 
 void polygon(cv::Mat& image, const std::vector<cv::Point2f>& points, const cv::Scalar& colour) {
@@ -84,9 +94,10 @@ void paint_eye(cv::Mat& face, const FaceFrame& f, float side, const PersonLook& 
   }
   polygon(face, lid, cv::Scalar(24, 24, 30));
   const float lift = 0.0205f, thick = look.woman ? 0.0024f : 0.0038f;
-  std::vector<cv::Point2f> brow{f.at(x - side * 0.014f, z + lift - 0.002f),        f.at(x, z + lift + 0.003f),
-                                f.at(x + side * 0.018f, z + lift - 0.001f),        f.at(x + side * 0.0195f, z + lift - 0.003f),
-                                f.at(x, z + lift + 0.003f - 1.6f * thick),         f.at(x - side * 0.014f, z + lift - 0.002f - 1.5f * thick)};
+  std::vector<cv::Point2f> brow{
+      f.at(x - side * 0.014f, z + lift - 0.002f), f.at(x, z + lift + 0.003f),
+      f.at(x + side * 0.018f, z + lift - 0.001f), f.at(x + side * 0.0195f, z + lift - 0.003f),
+      f.at(x, z + lift + 0.003f - 1.6f * thick),  f.at(x - side * 0.014f, z + lift - 0.002f - 1.5f * thick)};
   polygon(face, brow, scalar(look.hair * 0.8f));
 }
 
@@ -96,14 +107,17 @@ void paint_mouth_and_nose(cv::Mat& face, const FaceFrame& f, const PersonLook& l
     soften(face, f.at(side * 0.0085f, 1.5925f), {f.px(0.0042f), f.px(0.0026f)}, look.skin * 0.18f, 0.9f);
     soften(face, f.at(side * 0.014f, 1.600f), {f.px(0.003f), f.px(0.008f)}, dark, 0.5f);
     soften(face, f.at(side * 0.027f, 1.583f), {f.px(0.003f), f.px(0.014f)}, dark, 0.28f);
-    soften(face, f.at(side * 0.043f, 1.603f), {f.px(0.018f), f.px(0.014f)}, {look.skin[0] * 0.86f, look.skin[1] * 0.86f, std::min(250.f, look.skin[2] * 1.05f)}, 0.45f);
+    soften(face, f.at(side * 0.043f, 1.603f), {f.px(0.018f), f.px(0.014f)},
+           {look.skin[0] * 0.86f, look.skin[1] * 0.86f, std::min(250.f, look.skin[2] * 1.05f)}, 0.45f);
   }
   soften(face, f.at(0, 1.622f), {f.px(0.004f), f.px(0.020f)}, look.skin * 1.12f, 0.5f);
   const cv::Vec3f lip = look.woman ? cv::Vec3f(look.skin[0] * 0.62f, look.skin[1] * 0.52f, look.skin[2] * 0.88f)
                                    : cv::Vec3f(look.skin[0] * 0.76f, look.skin[1] * 0.70f, look.skin[2] * 0.88f);
-  std::vector<cv::Point2f> upper{f.at(-0.024f, 1.568f), f.at(-0.011f, 1.574f), f.at(-0.004f, 1.5765f), f.at(0, 1.575f),
-                                 f.at(0.004f, 1.5765f), f.at(0.011f, 1.574f),  f.at(0.024f, 1.568f),   f.at(0, 1.5675f)};
-  std::vector<cv::Point2f> lower{f.at(-0.024f, 1.568f), f.at(0, 1.5675f), f.at(0.024f, 1.568f), f.at(0.012f, 1.5595f), f.at(0, 1.5575f), f.at(-0.012f, 1.5595f)};
+  std::vector<cv::Point2f> upper{f.at(-0.024f, 1.568f), f.at(-0.011f, 1.574f), f.at(-0.004f, 1.5765f),
+                                 f.at(0, 1.575f),       f.at(0.004f, 1.5765f), f.at(0.011f, 1.574f),
+                                 f.at(0.024f, 1.568f),  f.at(0, 1.5675f)};
+  std::vector<cv::Point2f> lower{f.at(-0.024f, 1.568f), f.at(0, 1.5675f), f.at(0.024f, 1.568f),
+                                 f.at(0.012f, 1.5595f), f.at(0, 1.5575f), f.at(-0.012f, 1.5595f)};
   polygon(face, upper, scalar(lip * 0.86f));
   polygon(face, lower, scalar(lip));
   soften(face, f.at(0, 1.5677f), {f.px(0.021f), f.px(0.0012f)}, look.skin * 0.22f, 0.95f);
@@ -133,7 +147,8 @@ cv::Mat fold_light(cv::Size size, float top_m, float height_m, float stretch, st
   return out;
 }
 
-cv::Vec3f cloth_tone(PersonLook::Cloth cloth, const cv::Vec3f& tone, const cv::Vec3f& second, float x_m, float z_m, float period_m) {
+cv::Vec3f cloth_tone(PersonLook::Cloth cloth, const cv::Vec3f& tone, const cv::Vec3f& second, float x_m, float z_m,
+                     float period_m) {
   using Cloth = PersonLook::Cloth;
   auto band = [&](float v, float width) {
     const float phase = v / period_m - std::floor(v / period_m);
@@ -144,7 +159,8 @@ cv::Vec3f cloth_tone(PersonLook::Cloth cloth, const cv::Vec3f& tone, const cv::V
     return tone * (1 - m) + second * m;
   }
   if (cloth == Cloth::kChecks) {
-    const float m = 0.5f * band(z_m, 0.4f) + 0.5f * band(x_m + 1.f, 0.4f), line = std::max(band(z_m + 0.3f * period_m, 0.06f), band(x_m + 1.3f * period_m, 0.06f));
+    const float m = 0.5f * band(z_m, 0.4f) + 0.5f * band(x_m + 1.f, 0.4f),
+                line = std::max(band(z_m + 0.3f * period_m, 0.06f), band(x_m + 1.3f * period_m, 0.06f));
     return (tone * (1 - m) + second * m) * (1.f - 0.35f * line);
   }
   return tone;
@@ -176,13 +192,16 @@ cv::Mat paint_head(cv::Size size, const PersonLook& look) {
   if (look.glasses) {
     for (const float side : {-1.f, 1.f}) {
       const cv::Point2f c = f.at(side * 0.032f, 1.633f);
-      cv::ellipse(face, fixed(c), {static_cast<int>(f.px(0.022f) * 16), static_cast<int>(f.px(0.016f) * 16)}, 0, 0, 360, cv::Scalar(26, 24, 24), 2, cv::LINE_AA, kShift);
+      cv::ellipse(face, fixed(c), {static_cast<int>(f.px(0.022f) * 16), static_cast<int>(f.px(0.016f) * 16)}, 0, 0, 360,
+                  cv::Scalar(26, 24, 24), 2, cv::LINE_AA, kShift);
     }
     cv::line(face, f.at(-0.010f, 1.636f), f.at(0.010f, 1.636f), cv::Scalar(26, 24, 24), 2, cv::LINE_AA);
-    for (const float side : {-1.f, 1.f}) cv::line(face, f.at(side * 0.054f, 1.637f), f.at(side * 0.09f, 1.64f), cv::Scalar(26, 24, 24), 2, cv::LINE_AA);
+    for (const float side : {-1.f, 1.f})
+      cv::line(face, f.at(side * 0.054f, 1.637f), f.at(side * 0.09f, 1.64f), cv::Scalar(26, 24, 24), 2, cv::LINE_AA);
   }
   if (look.hair_style == PersonLook::Hair::kBald || look.hair_style == PersonLook::Hair::kCropped) {
-    soften(face, f.at(0, 1.76f), {f.px(0.08f), f.px(0.035f)}, look.hair, look.hair_style == PersonLook::Hair::kBald ? 0.12f : 0.7f);
+    soften(face, f.at(0, 1.76f), {f.px(0.08f), f.px(0.035f)}, look.hair,
+           look.hair_style == PersonLook::Hair::kBald ? 0.12f : 0.7f);
   }
   return image;
 }
@@ -204,7 +223,8 @@ cv::Mat paint_hair(cv::Size size, const PersonLook& look) {
       const float shine = fractal_noise(fx / 64, fy / 32, seed + 4, 4, 2);
       cv::Vec3f c = look.hair * (0.45f + 1.0f * strand) * (0.75f + 0.6f * shine);
       c += cv::Vec3f(14, 14, 14) * smooth_step(0.55f, 0.8f, shine);
-      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]), cv::saturate_cast<std::uint8_t>(c[2])};
+      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]),
+                                   cv::saturate_cast<std::uint8_t>(c[2])};
     }
   }
   return image;
@@ -221,13 +241,17 @@ cv::Mat paint_top(cv::Size size, const PersonLook& look) {
     for (int x = 0; x < size.width; ++x) {
       const float x_m = (static_cast<float>(x % half) / static_cast<float>(half) - 0.5f) * 0.7f;
       const float z_m = 1.55f - static_cast<float>(y) / static_cast<float>(size.height) * 0.7f;
-      const float weave = 0.93f + 0.14f * value_noise(static_cast<float>(x) * 0.7f, static_cast<float>(y) * 0.7f, seed, 1024);
-      const cv::Vec3f c = cloth_tone(look.top, look.top_tone, look.top_second, x_m, z_m, period) * (weave * folds.at<float>(y, x));
-      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]), cv::saturate_cast<std::uint8_t>(c[2])};
+      const float weave =
+          0.93f + 0.14f * value_noise(static_cast<float>(x) * 0.7f, static_cast<float>(y) * 0.7f, seed, 1024);
+      const cv::Vec3f c =
+          cloth_tone(look.top, look.top_tone, look.top_second, x_m, z_m, period) * (weave * folds.at<float>(y, x));
+      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]),
+                                   cv::saturate_cast<std::uint8_t>(c[2])};
     }
   }
   auto at = [&](float x_m, float z_m) {
-    return cv::Point(static_cast<int>((0.5f + x_m / 0.7f) * static_cast<float>(half)), static_cast<int>((1.55f - z_m) / 0.7f * static_cast<float>(size.height)));
+    return cv::Point(static_cast<int>((0.5f + x_m / 0.7f) * static_cast<float>(half)),
+                     static_cast<int>((1.55f - z_m) / 0.7f * static_cast<float>(size.height)));
   };
   if (look.top == PersonLook::Cloth::kPrint) {
     const cv::Rect area(at(-0.085f, 1.36f), at(0.085f, 1.16f));
@@ -239,7 +263,8 @@ cv::Mat paint_top(cv::Size size, const PersonLook& look) {
   if (look.collar) {  // button line of a shirt, and a pocket
     const cv::Scalar seam = scalar(look.top_tone * 0.6f);
     for (const float x : {-0.017f, 0.017f}) cv::line(image, at(x, 1.5f), at(x, 0.86f), seam, 1, cv::LINE_AA);
-    for (float z = 1.44f; z > 0.9f; z -= 0.085f) cv::circle(image, at(0, z), 3, cv::Scalar(225, 228, 230), cv::FILLED, cv::LINE_AA);
+    for (float z = 1.44f; z > 0.9f; z -= 0.085f)
+      cv::circle(image, at(0, z), 3, cv::Scalar(225, 228, 230), cv::FILLED, cv::LINE_AA);
     cv::rectangle(image, at(0.05f, 1.33f), at(0.14f, 1.22f), seam, 1, cv::LINE_AA);
   }
   return image;
@@ -258,26 +283,32 @@ cv::Mat paint_bottom(cv::Size size, const PersonLook& look) {
       float light = folds.at<float>(y, x);
       cv::Vec3f c = cloth_tone(look.bottom, look.bottom_tone, look.bottom_tone * 1.5f, x_m, z_m, 0.07f);
       if (jeans) {
-        const float twill = 0.88f + 0.24f * value_noise(static_cast<float>(x + y) * 0.5f, static_cast<float>(x - y) * 0.15f + 300, seed + 4, 1024);
-        const float dx = (std::abs(x_m) - 0.1f) / 0.035f, worn = std::exp(-dx * dx) * smooth_step(0.25f, 0.6f, z_m) * smooth_step(0.95f, 0.7f, z_m);
+        const float twill = 0.88f + 0.24f * value_noise(static_cast<float>(x + y) * 0.5f,
+                                                        static_cast<float>(x - y) * 0.15f + 300, seed + 4, 1024);
+        const float dx = (std::abs(x_m) - 0.1f) / 0.035f,
+                    worn = std::exp(-dx * dx) * smooth_step(0.25f, 0.6f, z_m) * smooth_step(0.95f, 0.7f, z_m);
         c = c * (1.f + 0.45f * worn);
         light *= twill;
         if (std::abs(std::abs(x_m) - 0.165f) < 0.003f) light *= 0.7f;
       }
       const float gap = smooth_step(0.012f, 0.0f, std::abs(x_m)) * smooth_step(0.86f, 0.80f, z_m);
       c = c * (light * (1.f - 0.5f * gap));
-      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]), cv::saturate_cast<std::uint8_t>(c[2])};
+      image.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(c[0]), cv::saturate_cast<std::uint8_t>(c[1]),
+                                   cv::saturate_cast<std::uint8_t>(c[2])};
     }
   }
   auto at = [&](float x_m, float z_m, int side) {
-    return cv::Point(side * half + static_cast<int>((0.5f + x_m / 0.7f) * static_cast<float>(half)), static_cast<int>((1.05f - z_m) / 1.05f * static_cast<float>(size.height)));
+    return cv::Point(side * half + static_cast<int>((0.5f + x_m / 0.7f) * static_cast<float>(half)),
+                     static_cast<int>((1.05f - z_m) / 1.05f * static_cast<float>(size.height)));
   };
   const cv::Scalar stitch = jeans ? cv::Scalar(90, 140, 180) : scalar(look.bottom_tone * 0.6f);
   for (int side = 0; side < 2; ++side) {
     cv::line(image, at(-0.3f, 0.995f, side), at(0.3f, 0.995f, side), stitch, 1, cv::LINE_AA);
     for (const float x : {-0.09f, 0.09f}) {
-      if (side) cv::rectangle(image, at(x - 0.05f, 0.93f, 1), at(x + 0.05f, 0.81f, 1), stitch, 1, cv::LINE_AA);
-      else cv::line(image, at(x * 0.7f, 0.99f, 0), at(x * 1.7f, 0.92f, 0), stitch, 1, cv::LINE_AA);
+      if (side)
+        cv::rectangle(image, at(x - 0.05f, 0.93f, 1), at(x + 0.05f, 0.81f, 1), stitch, 1, cv::LINE_AA);
+      else
+        cv::line(image, at(x * 0.7f, 0.99f, 0), at(x * 1.7f, 0.92f, 0), stitch, 1, cv::LINE_AA);
     }
   }
   return image;

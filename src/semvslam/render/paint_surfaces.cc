@@ -68,7 +68,8 @@ cv::Mat paint_wood(cv::Size size, const cv::Vec3f& tone, int boards, std::uint32
       light *= 0.45f + 0.55f * smooth_step(0.f, 1.8f, gap);
     }
     light *= 0.9f + 0.2f * value_noise(static_cast<float>(x) * 0.012f, static_cast<float>(y) * 0.012f, seed + 9, 4096);
-    return {tone[0] * light * (1.f - 0.12f * piece.warm), tone[1] * light, tone[2] * light * (1.f + 0.06f * piece.warm)};
+    return {tone[0] * light * (1.f - 0.12f * piece.warm), tone[1] * light,
+            tone[2] * light * (1.f + 0.06f * piece.warm)};
   });
 }
 
@@ -116,7 +117,8 @@ cv::Mat paint_bricks(cv::Size size, int courses, std::uint32_t seed) {
     const float grit = fractal_noise(fx * 0.12f, fy * 0.12f, seed + 1, 4096, 4);
     const float pits = value_noise(fx * 0.3f, fy * 0.3f, seed + 2, 4096) > 0.9f ? 0.75f : 1.f;
     const float burnt = lattice_hash(column, course, seed + 3) > 0.8f ? 0.62f : 1.f;
-    const cv::Vec3f brick = cv::Vec3f(62 + 30 * tone, 84 + 34 * tone, 148 + 46 * tone) * ((0.62f + 0.7f * grit) * pits * burnt);
+    const cv::Vec3f brick =
+        cv::Vec3f(62 + 30 * tone, 84 + 34 * tone, 148 + 46 * tone) * ((0.62f + 0.7f * grit) * pits * burnt);
     const cv::Vec3f mortar = cv::Vec3f(150, 160, 166) * (0.7f + 0.5f * grit);
     const float edge = 0.8f + 0.2f * smooth_step(brick_h * 0.1f, brick_h * 0.2f, gap);
     return mortar * (1.f - joint) + brick * (joint * edge);
@@ -133,7 +135,8 @@ cv::Mat paint_tiles(cv::Size size, int across, const cv::Vec3f& tone, std::uint3
     const auto own = seed + static_cast<std::uint32_t>(i * 1013 + j * 7);
     const float cloud = fractal_noise(a * 0.02f, b * 0.02f, own, 4096, 4);
     const float vein = std::abs(fractal_noise(a * 0.015f, b * 0.015f, own + 3, 4096, 4) - 0.5f);
-    float light = 0.8f + 0.22f * lattice_hash(i, j, seed) + 0.35f * (cloud - 0.5f) - 0.22f * smooth_step(0.03f, 0.0f, vein);
+    float light =
+        0.8f + 0.22f * lattice_hash(i, j, seed) + 0.35f * (cloud - 0.5f) - 0.22f * smooth_step(0.03f, 0.0f, vein);
     const float speck = value_noise(fx * 0.45f, fy * 0.45f, seed + 6, 4096);
     light *= speck > 0.92f ? 0.82f : 1.f;
     const float joint = smooth_step(1.0f, 2.6f, gap);
@@ -173,22 +176,26 @@ cv::Mat paint_rug(cv::Size size, std::uint64_t seed) {
   const int field = static_cast<int>(0.17 * h);
   cv::rectangle(image, {field, field}, {w - field, h - field}, tone(hue + 0.02, 0.62, 0.48), cv::FILLED);
   for (int i = 0; i < 130; ++i) {
-    const cv::Point at(static_cast<int>(random.uniform(field, w - field)), static_cast<int>(random.uniform(field, h - field)));
+    const cv::Point at(static_cast<int>(random.uniform(field, w - field)),
+                       static_cast<int>(random.uniform(field, h - field)));
     const double r = random.uniform(0.012, 0.075) * h;
     const int petals = 3 + random.below(6);
     const cv::Scalar c = tone(hue + random.uniform(-0.2, 0.5), random.uniform(0.2, 0.7), random.uniform(0.25, 0.85));
     for (int k = 0; k < petals; ++k) {
       const double a = 2 * M_PI * k / petals;
-      cv::ellipse(image, at + cv::Point(static_cast<int>(r * 0.6 * std::cos(a)), static_cast<int>(r * 0.6 * std::sin(a))),
-                  cv::Size(std::max(1, static_cast<int>(r * 0.5)), std::max(1, static_cast<int>(r * 0.22))), a * 180 / M_PI, 0,
-                  360, c, cv::FILLED, cv::LINE_AA);
+      cv::ellipse(image,
+                  at + cv::Point(static_cast<int>(r * 0.6 * std::cos(a)), static_cast<int>(r * 0.6 * std::sin(a))),
+                  cv::Size(std::max(1, static_cast<int>(r * 0.5)), std::max(1, static_cast<int>(r * 0.22))),
+                  a * 180 / M_PI, 0, 360, c, cv::FILLED, cv::LINE_AA);
     }
     cv::circle(image, at, std::max(1, static_cast<int>(r * 0.25)), tone(hue + 0.5, 0.4, 0.8), cv::FILLED, cv::LINE_AA);
   }
   const auto noise_seed = random.bits32();
   return paint(size, [&](int x, int y) -> cv::Vec3f {
-    const float weave = fractal_noise(static_cast<float>(x) * 0.45f, static_cast<float>(y) * 0.45f, noise_seed, 4096, 2, 0.8f);
-    const float worn = fractal_noise(static_cast<float>(x) * 0.012f, static_cast<float>(y) * 0.012f, noise_seed + 1, 4096, 4);
+    const float weave =
+        fractal_noise(static_cast<float>(x) * 0.45f, static_cast<float>(y) * 0.45f, noise_seed, 4096, 2, 0.8f);
+    const float worn =
+        fractal_noise(static_cast<float>(x) * 0.012f, static_cast<float>(y) * 0.012f, noise_seed + 1, 4096, 4);
     return cv::Vec3f(image.at<cv::Vec3b>(y, x)) * ((0.6f + 0.7f * weave) * (0.75f + 0.5f * worn));
   });
 }
@@ -201,7 +208,8 @@ cv::Mat paint_wallpaper(cv::Size size, std::uint64_t seed) {
   cv::Mat image = paint(size, [&](int x, int y) -> cv::Vec3f {
     const float phase = std::fmod(static_cast<float>(x), 120.f) / 120.f;
     const float mix = smooth_step(0.42f, 0.46f, phase) * smooth_step(0.96f, 0.92f, phase);
-    const float fade = fractal_noise(static_cast<float>(x) * 0.004f, static_cast<float>(y) * 0.004f, noise_seed, 4096, 5);
+    const float fade =
+        fractal_noise(static_cast<float>(x) * 0.004f, static_cast<float>(y) * 0.004f, noise_seed, 4096, 3);
     return (base * (1.f - mix) + stripe * mix) * (0.82f + 0.36f * fade);
   });
   const int ornaments = size.area() / 5200;
@@ -214,8 +222,8 @@ cv::Mat paint_wallpaper(cv::Size size, std::uint64_t seed) {
     for (int k = 0; k < petals; ++k) {
       const double a = turn + 2 * M_PI * k / petals;
       cv::ellipse(image, at + cv::Point(static_cast<int>(r * std::cos(a)), static_cast<int>(r * std::sin(a))),
-                  cv::Size(std::max(1, static_cast<int>(r * 0.6)), std::max(1, static_cast<int>(r * 0.28))), a * 180 / M_PI, 0,
-                  360, cv::Scalar(c[0], c[1], c[2]), cv::FILLED, cv::LINE_AA);
+                  cv::Size(std::max(1, static_cast<int>(r * 0.6)), std::max(1, static_cast<int>(r * 0.28))),
+                  a * 180 / M_PI, 0, 360, cv::Scalar(c[0], c[1], c[2]), cv::FILLED, cv::LINE_AA);
     }
   }
   return image;
@@ -238,7 +246,8 @@ cv::Mat paint_fabric(cv::Size size, const cv::Vec3f& tone, const cv::Vec3f& seco
     const bool over = ((x / 2) + (y / 2)) % 2 == 0;
     const float thread = fractal_noise(over ? fx * 0.06f : fx * 0.5f, over ? fy * 0.5f : fy * 0.06f, seed, 4096, 2);
     const float fold = fractal_noise(fx / 48.f, fy / 48.f, seed + 3, std::max(1, size.width / 48), 3);
-    const float blend = smooth_step(0.35f, 0.65f, fractal_noise(fx / 24.f, fy / 24.f, seed + 5, std::max(1, size.width / 24), 4));
+    const float blend =
+        smooth_step(0.35f, 0.65f, fractal_noise(fx / 24.f, fy / 24.f, seed + 5, std::max(1, size.width / 24), 4));
     return (tone * (1.f - blend) + second * blend) * ((0.75f + 0.5f * thread) * (0.8f + 0.4f * fold));
   });
 }

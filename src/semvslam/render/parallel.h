@@ -10,8 +10,8 @@
 
 namespace semvslam::render {
 
-/// Calls body(i, worker) for i in [0, count) on `threads` threads; worker in [0, threads). The calls must not depend on each
-/// other, so the result does not depend on the number of threads. The first exception is rethrown here.
+/// Calls body(i, worker) for i in [0, count) on `threads` threads; worker in [0, threads). The calls must not depend on
+/// each other, so the result does not depend on the number of threads. The first exception is rethrown here.
 template <typename Body>
 void parallel_for(int count, int threads, Body&& body) {
   threads = std::clamp(threads, 1, std::max(count, 1));

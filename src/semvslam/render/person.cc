@@ -35,7 +35,9 @@ std::array<Vector2f, 3> chart(const BodyPart& part, const std::array<Vector3f, 3
       int axis = 0;
       normal.cwiseAbs().maxCoeff(&axis);
       const Vector3f& q = p[i];
-      uv[i] = axis == 0 ? Vector2f(q.y(), -q.z()) / image : axis == 1 ? Vector2f(q.x(), -q.z()) / image : Vector2f(q.x(), q.y()) / image;
+      uv[i] = axis == 0   ? Vector2f(q.y(), -q.z()) / image
+              : axis == 1 ? Vector2f(q.x(), -q.z()) / image
+                          : Vector2f(q.x(), q.y()) / image;
     }
   }
   return uv;
@@ -61,12 +63,15 @@ PersonLook random_look(std::uint64_t seed) {
   look.woman = random.chance(0.45);
   look.height_m = std::clamp((look.woman ? 1.665 : 1.785) + 0.06 * random.normal(), 1.5, 1.98);
   look.girth = std::clamp(1.0 + 0.09 * random.normal(), 0.86, 1.22);
-  static const cv::Vec3f kSkins[] = {{158, 184, 226}, {142, 170, 216}, {120, 152, 204}, {96, 128, 182}, {66, 94, 146}, {46, 66, 104}};
+  static const cv::Vec3f kSkins[] = {{158, 184, 226}, {142, 170, 216}, {120, 152, 204},
+                                     {96, 128, 182},  {66, 94, 146},   {46, 66, 104}};
   look.skin = kSkins[random.below(6)];
-  static const cv::Vec3f kHairs[] = {{22, 24, 28}, {28, 38, 56}, {40, 60, 92}, {70, 110, 150}, {96, 150, 196}, {34, 62, 128}, {150, 152, 154}};
+  static const cv::Vec3f kHairs[] = {{22, 24, 28},   {28, 38, 56},  {40, 60, 92},   {70, 110, 150},
+                                     {96, 150, 196}, {34, 62, 128}, {150, 152, 154}};
   look.hair = kHairs[look.skin[2] < 160 ? random.below(2) : random.below(7)];
   using Hair = PersonLook::Hair;
-  const Hair hers[] = {Hair::kLong, Hair::kBob, Hair::kBun, Hair::kLong}, his[] = {Hair::kShort, Hair::kCropped, Hair::kShort, Hair::kBald};
+  const Hair hers[] = {Hair::kLong, Hair::kBob, Hair::kBun, Hair::kLong},
+             his[] = {Hair::kShort, Hair::kCropped, Hair::kShort, Hair::kBald};
   look.hair_style = look.woman ? hers[random.below(4)] : his[random.below(4)];
   look.beard = !look.woman && random.chance(0.35);
   look.glasses = random.chance(0.3);
@@ -76,41 +81,46 @@ PersonLook random_look(std::uint64_t seed) {
   using Cloth = PersonLook::Cloth;
   const Cloth tops[] = {Cloth::kPlain, Cloth::kStripes, Cloth::kChecks, Cloth::kPrint};
   look.top = tops[random.below(4)];
-  look.bottom = look.skirt ? (random.chance(0.5) ? Cloth::kPlain : Cloth::kChecks) : (random.chance(0.6) ? Cloth::kJeans : Cloth::kPlain);
+  look.bottom = look.skirt ? (random.chance(0.5) ? Cloth::kPlain : Cloth::kChecks)
+                           : (random.chance(0.6) ? Cloth::kJeans : Cloth::kPlain);
   const double hue = random.uniform();
   look.top_tone = hue_colour(hue, random.uniform(0.25, 0.75), random.uniform(0.25, 0.85));
-  look.top_second = hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), random.uniform(0.0, 0.5), random.uniform(0.1, 0.9));
-  look.bottom_tone = look.bottom == Cloth::kJeans ? cv::Vec3f(118, 82, 58) * static_cast<float>(random.uniform(0.6, 1.25))
-                                                  : hue_colour(random.uniform(0.05, 0.7), 0.25, random.uniform(0.16, 0.6));
-  look.shoes = random.chance(0.3) ? cv::Vec3f(200, 205, 208) : hue_colour(random.uniform(), 0.3, random.uniform(0.1, 0.3));
+  look.top_second =
+      hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), random.uniform(0.0, 0.5), random.uniform(0.1, 0.9));
+  look.bottom_tone = look.bottom == Cloth::kJeans
+                         ? cv::Vec3f(118, 82, 58) * static_cast<float>(random.uniform(0.6, 1.25))
+                         : hue_colour(random.uniform(0.05, 0.7), 0.25, random.uniform(0.16, 0.6));
+  look.shoes =
+      random.chance(0.3) ? cv::Vec3f(200, 205, 208) : hue_colour(random.uniform(), 0.3, random.uniform(0.1, 0.3));
   return look;
 }
 
 Person::Surface Person::make_piece(const std::vector<BodyPart>& parts, const BodyPart& part, float coarseness) {
-    const ShapeMesh shape = polygonise(part.shape, part.cell_m * coarseness);
-    Surface piece;
-    piece.vertices.reserve(shape.vertices.size());
-    for (std::size_t v = 0; v < shape.vertices.size(); ++v) {
-      const Eigen::Vector3d p = shape.vertices[v].cast<double>();
-      SkinWeights weights = skin_weights(p);
-      if (part.skirt) weights = skirt_weights(p);
-      // Hair and face follow the head as one piece.
-      if (p.z() > 1.53 && std::abs(p.x()) < 0.13) weights = {{kHead, 0, 0, 0}, {1.f, 0, 0, 0}};
-      piece.vertices.push_back({p, shape.normals[v].cast<double>(), weights, openness(parts, shape.vertices[v], shape.normals[v])});
+  const ShapeMesh shape = polygonise(part.shape, part.cell_m * coarseness);
+  Surface piece;
+  piece.vertices.reserve(shape.vertices.size());
+  for (std::size_t v = 0; v < shape.vertices.size(); ++v) {
+    const Eigen::Vector3d p = shape.vertices[v].cast<double>();
+    SkinWeights weights = skin_weights(p);
+    if (part.skirt) weights = skirt_weights(p);
+    // Hair and face follow the head as one piece.
+    if (p.z() > 1.53 && std::abs(p.x()) < 0.13) weights = {{kHead, 0, 0, 0}, {1.f, 0, 0, 0}};
+    piece.vertices.push_back(
+        {p, shape.normals[v].cast<double>(), weights, openness(parts, shape.vertices[v], shape.normals[v])});
+  }
+  for (const auto& corners : shape.triangles) {
+    const std::array<Vector3f, 3> p{shape.vertices[corners[0]], shape.vertices[corners[1]], shape.vertices[corners[2]]};
+    const Vector3f normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+    const auto uv = chart(part, p, normal);
+    Triangle t;
+    t.texture = part.texture;
+    for (int c = 0; c < 3; ++c) {
+      t.corners[c].vertex = corners[c];
+      t.corners[c].uv = uv[c];
     }
-    for (const auto& corners : shape.triangles) {
-      const std::array<Vector3f, 3> p{shape.vertices[corners[0]], shape.vertices[corners[1]], shape.vertices[corners[2]]};
-      const Vector3f normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
-      const auto uv = chart(part, p, normal);
-      Triangle t;
-      t.texture = part.texture;
-      for (int c = 0; c < 3; ++c) {
-        t.corners[c].vertex = corners[c];
-        t.corners[c].uv = uv[c];
-      }
-      piece.triangles.push_back(t);
-    }
-    return piece;
+    piece.triangles.push_back(t);
+  }
+  return piece;
 }
 
 void Person::Surface::append(const Surface& piece) {
@@ -126,7 +136,8 @@ Person::Person(const PersonLook& look, SceneBuilder& builder, int threads) : loo
   const std::vector<BodyPart> parts = make_body_parts(look, builder);
   const int count = static_cast<int>(parts.size());
   std::vector<Surface> pieces(2 * count);
-  parallel_for(2 * count, threads, [&](int i, int) { pieces[i] = make_piece(parts, parts[i % count], i < count ? 1.f : kCoarse); });
+  parallel_for(2 * count, threads,
+               [&](int i, int) { pieces[i] = make_piece(parts, parts[i % count], i < count ? 1.f : kCoarse); });
   for (int i = 0; i < 2 * count; ++i) (i < count ? fine_ : coarse_).append(pieces[i]);
 }
 

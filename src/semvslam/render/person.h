@@ -45,8 +45,8 @@ class Person {
 
   /// The surface in a pose. @param world_from_person floor pose; the body is scaled to its height here.
   /// @param light brightness from +x -x +y -y +z -z of the world. @param fine near the camera.
-  void pose(const std::array<BoneMotion, kBones>& motions, const SE3& world_from_person, const std::array<float, 6>& light,
-            bool fine, Mesh& out) const;
+  void pose(const std::array<BoneMotion, kBones>& motions, const SE3& world_from_person,
+            const std::array<float, 6>& light, bool fine, Mesh& out) const;
   double scale() const { return look_.height_m / 1.75; }
 
  private:

@@ -10,7 +10,8 @@ namespace semvslam::render {
 namespace {
 
 constexpr double kNear_m = 0.05;
-// Sample points in pixels from the centre. The four of the colour are symmetric to it: no shift between colour and depth.
+// Sample points in pixels from the centre. The four of the colour are symmetric to it: no shift between colour and
+// depth.
 constexpr float kOffsetX[5] = {0.f, -0.125f, 0.375f, 0.125f, -0.375f};
 constexpr float kOffsetY[5] = {0.f, -0.375f, -0.125f, 0.375f, 0.125f};
 constexpr std::uint32_t kNothing = 0xffffffffu;
@@ -196,7 +197,8 @@ Colour4 Rasterizer::shade(const ScreenTriangle& t, float x, float y, const std::
   // Derivative of a quotient of two planes.
   const Plane& w = t.inverse_depth_local;
   const Texture& texture = textures[t.texture];
-  const float columns = static_cast<float>(texture.width()) * depth, rows = static_cast<float>(texture.height()) * depth;
+  const float columns = static_cast<float>(texture.width()) * depth,
+              rows = static_cast<float>(texture.height()) * depth;
   const float ux = (t.u.dx - u * w.dx) * columns, uy = (t.u.dy - u * w.dy) * columns;
   const float vx = (t.v.dx - v * w.dx) * rows, vy = (t.v.dy - v * w.dy) * rows;
   const float along_x = ux * ux + vx * vx, along_y = uy * uy + vy * vy;  // texels^2 per pixel
@@ -267,7 +269,8 @@ void Rasterizer::resolve_band(int band, const BandBuffers& buffers, const std::v
             if (other > s) ids[other] = kNothing;
           }
           sum += shade(triangles_[id], static_cast<float>(x) + mean_x / count, static_cast<float>(y) + mean_y / count,
-                       textures, light) * count;
+                       textures, light) *
+                 count;
         }
       }
       for (int c = 0; c < 3; ++c) {
@@ -293,7 +296,8 @@ void Rasterizer::draw(const std::vector<const Mesh*>& meshes, const std::vector<
   for (const auto& part : parts) {
     for (const ScreenTriangle& triangle : part) {
       const auto id = static_cast<std::uint32_t>(triangles_.size());
-      for (int band = triangle.first_row / kBandRows; band <= triangle.last_row / kBandRows; ++band) bins_[band].push_back(id);
+      for (int band = triangle.first_row / kBandRows; band <= triangle.last_row / kBandRows; ++band)
+        bins_[band].push_back(id);
       triangles_.push_back(triangle);
     }
   }

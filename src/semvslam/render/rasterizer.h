@@ -22,10 +22,10 @@ struct Picture {
   cv::Mat instances;  // CV_8UC1, Mesh::role at the pixel centre
 };
 
-/// Software z-buffer renderer: visibility at five points of each pixel (the centre, which alone gives depth, and four points
-/// symmetric to it, which give colour), then each visible triangle is shaded once per pixel at the mean of its points.
-/// Inverse depth and texture coordinates over depth are linear in the picture (Blinn 1992; homogeneous set-up as in Olano
-/// and Greer 1997), so perspective is exact.
+/// Software z-buffer renderer: visibility at five points of each pixel (the centre, which alone gives depth, and four
+/// points symmetric to it, which give colour), then each visible triangle is shaded once per pixel at the mean of its
+/// points. Inverse depth and texture coordinates over depth are linear in the picture (Blinn 1992; homogeneous set-up
+/// as in Olano and Greer 1997), so perspective is exact.
 class Rasterizer {
  public:
   explicit Rasterizer(const Camera& camera);

@@ -48,7 +48,8 @@ Mesh quad(const std::array<Eigen::Vector3d, 4>& corners, std::uint8_t role = 0, 
   return mesh;
 }
 
-Picture draw(const Camera& camera, const std::vector<Mesh>& meshes, const std::vector<Texture>& textures, const SE3& pose = {}) {
+Picture draw(const Camera& camera, const std::vector<Mesh>& meshes, const std::vector<Texture>& textures,
+             const SE3& pose = {}) {
   Rasterizer rasterizer(camera);
   std::vector<const Mesh*> pointers;
   for (const Mesh& mesh : meshes) pointers.push_back(&mesh);
@@ -67,9 +68,12 @@ TEST(Rasterizer, DepthAtPixelCentresIsWhereTheRayMeetsThePlane) {
   const Camera camera = small_camera();
   RandomStream random(3);
   for (int trial = 0; trial < 30; ++trial) {
-    const SE3 world_from_camera = SE3::exp((SE3::Tangent() << random.normal(), random.normal(), random.normal(), random.normal(), random.normal(), random.normal()).finished());
+    const SE3 world_from_camera = SE3::exp((SE3::Tangent() << random.normal(), random.normal(), random.normal(),
+                                            random.normal(), random.normal(), random.normal())
+                                               .finished());
     const Eigen::Vector3d centre(random.uniform(-0.5, 0.5), random.uniform(-0.4, 0.4), random.uniform(1.0, 6.0));
-    Eigen::Vector3d u(random.normal(), random.normal(), 0.6 * random.normal()), v(random.normal(), random.normal(), 0.6 * random.normal());
+    Eigen::Vector3d u(random.normal(), random.normal(), 0.6 * random.normal()),
+        v(random.normal(), random.normal(), 0.6 * random.normal());
     const Eigen::Vector3d n = u.cross(v);
     const std::array<Eigen::Vector3d, 4> local{centre - u - v, centre + u - v, centre + u + v, centre - u + v};
     std::array<Eigen::Vector3d, 4> world;
@@ -81,7 +85,8 @@ TEST(Rasterizer, DepthAtPixelCentresIsWhereTheRayMeetsThePlane) {
         const Eigen::Vector3d ray = camera.back_project({x, y}, 1.0);
         const double z = n.dot(centre) / n.dot(ray);
         const Eigen::Vector3d from_centre = z * ray - centre;
-        const double a = std::abs(from_centre.cross(v).dot(n)) / n.squaredNorm(), b = std::abs(u.cross(from_centre).dot(n)) / n.squaredNorm();
+        const double a = std::abs(from_centre.cross(v).dot(n)) / n.squaredNorm(),
+                     b = std::abs(u.cross(from_centre).dot(n)) / n.squaredNorm();
         const double rim = 1e-4;
         if (z > 0.06 && a < 1 - rim && b < 1 - rim) {
           ASSERT_NEAR(picture.depth_m.at<float>(y, x), z, 3e-6 * z) << "trial " << trial << " pixel " << x << "," << y;
@@ -108,7 +113,8 @@ TEST(Rasterizer, EdgesLieWhereTheirProjectionSays) {
   for (int i = 0; i < kTrials; ++i) {
     const double edge_px = 40 + 3.0 * i / kTrials, z = 2.0;
     const double x = (edge_px - camera.cx_px) / camera.fx_px * z;
-    const Picture picture = draw(camera, {quad({Eigen::Vector3d(-9, 9, z), {x, 9, z}, {x, -9, z}, {-9, -9, z}})}, white());
+    const Picture picture =
+        draw(camera, {quad({Eigen::Vector3d(-9, 9, z), {x, 9, z}, {x, -9, z}, {-9, -9, z}})}, white());
     double sum = 0;
     for (int c = 0; c < camera.width_px; ++c) sum += picture.colour.at<cv::Vec3b>(30, c)[0];
     const double measured_px = sum / 200.0 - 0.5;
@@ -127,11 +133,14 @@ TEST(Rasterizer, TexelsComeOutWhereTheyProject) {
   cv::Mat image(64, 64, CV_8UC3);
   RandomStream random(8);
   for (int y = 0; y < 64; ++y) {
-    for (int x = 0; x < 64; ++x) image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(random.below(256)), static_cast<std::uint8_t>(random.below(256)), 90};
+    for (int x = 0; x < 64; ++x)
+      image.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(random.below(256)),
+                                   static_cast<std::uint8_t>(random.below(256)), 90};
   }
   std::vector<Texture> textures;
   textures.emplace_back(image, false);
-  const Picture picture = draw(camera, {quad({Eigen::Vector3d(-1, 1, 2), {1, 1, 2}, {1, -1, 2}, {-1, -1, 2}})}, textures);
+  const Picture picture =
+      draw(camera, {quad({Eigen::Vector3d(-1, 1, 2), {1, 1, 2}, {1, -1, 2}, {-1, -1, 2}})}, textures);
   EXPECT_LE(cv::norm(picture.colour, image, cv::NORM_INF), 1.0);
 }
 
@@ -157,7 +166,8 @@ TEST(Rasterizer, NeighbouringTrianglesLeaveNoGapAndNoOverlap) {
       front.triangles.push_back(t);
     }
     front.update_bounds();
-    const Picture picture = draw(camera, {front, quad({Eigen::Vector3d(-9, 9, 3), {9, 9, 3}, {9, -9, 3}, {-9, -9, 3}}, 2)}, white());
+    const Picture picture =
+        draw(camera, {front, quad({Eigen::Vector3d(-9, 9, 3), {9, 9, 3}, {9, -9, 3}, {-9, -9, 3}}, 2)}, white());
     EXPECT_EQ(cv::countNonZero(picture.instances == 1), camera.width_px * camera.height_px);
     double low, high;
     cv::minMaxLoc(picture.colour.reshape(1), &low, &high);

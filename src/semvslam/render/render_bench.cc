@@ -17,8 +17,16 @@ void render_frames(benchmark::State& state, const char* people, const char* moti
   for (auto _ : state) benchmark::DoNotOptimize(scene->render(index += 7).frame.gray.data);
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK_CAPTURE(render_frames, walking_halfsphere, "walking", "halfsphere")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(render_frames, empty_tour, "none", "tour")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(render_frames, walking_halfsphere, "walking", "halfsphere")
+    ->Arg(1)
+    ->Arg(2)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(render_frames, empty_tour, "none", "tour")
+    ->Arg(1)
+    ->Arg(2)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 void create_scene(benchmark::State& state) {
   SceneOptions options;

@@ -21,8 +21,8 @@ struct Seat {
   double height_m = 0.45;
 };
 
-// The plan, in metres. Room A is [-3.6, 3.6] x [-3.2, 3.2]; room B is [3.72, 7.3] x [-3.2, 3.2]; two doorways join them, so
-// that there is a loop. A group of desks stands in the middle of A. Lanes are free of furniture at body width.
+// The plan, in metres. Room A is [-3.6, 3.6] x [-3.2, 3.2]; room B is [3.72, 7.3] x [-3.2, 3.2]; two doorways join
+// them, so that there is a loop. A group of desks stands in the middle of A. Lanes are free of furniture at body width.
 constexpr double kRoomHeight_m = 2.7;
 constexpr double kRoomAWest_m = -3.6, kRoomAEast_m = 3.6, kRoomBWest_m = 3.72, kRoomBEast_m = 7.3;
 constexpr double kRoomsSouth_m = -3.2, kRoomsNorth_m = 3.2;
@@ -35,7 +35,8 @@ struct Room {
   std::vector<Seat> seats;
 };
 
-/// Adds floors, walls, doors, windows, lamps and furniture. @param seed of textures and clutter; the plan is always the same.
+/// Adds floors, walls, doors, windows, lamps and furniture. @param seed of textures and clutter; the plan is always the
+/// same.
 Room build_room(SceneBuilder& builder, std::uint64_t seed);
 
 }  // namespace semvslam::render

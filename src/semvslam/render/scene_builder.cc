@@ -12,7 +12,8 @@ namespace {
 constexpr int kAtlasWidth = 1024;
 constexpr int kMaxPatchSide = 160;
 
-Eigen::Vector2f texture_coordinate(const Skin& skin, double along_u_m, double along_v_m, double u_size_m, double v_size_m) {
+Eigen::Vector2f texture_coordinate(const Skin& skin, double along_u_m, double along_v_m, double u_size_m,
+                                   double v_size_m) {
   double a = along_u_m, b = along_v_m, a_size = u_size_m, b_size = v_size_m;
   if (skin.turned) {
     std::swap(a, b);
@@ -20,7 +21,8 @@ Eigen::Vector2f texture_coordinate(const Skin& skin, double along_u_m, double al
   }
   const double width = skin.image_size_m.x() > 0 ? skin.image_size_m.x() : a_size;
   const double height = skin.image_size_m.y() > 0 ? skin.image_size_m.y() : b_size;
-  return {static_cast<float>((a + skin.offset_m.x()) / width), static_cast<float>(1.0 - (b + skin.offset_m.y()) / height)};
+  return {static_cast<float>((a + skin.offset_m.x()) / width),
+          static_cast<float>(1.0 - (b + skin.offset_m.y()) / height)};
 }
 
 Triangle triangle_of(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint16_t texture) {
@@ -44,8 +46,8 @@ void SceneBuilder::begin_mesh() { scene_.meshes.emplace_back(); }
 void SceneBuilder::quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& along_u, const Eigen::Vector3d& along_v,
                         const Skin& skin, double light_step_m, bool emissive) {
   const auto base = static_cast<std::uint32_t>(mesh().vertices.size());
-  for (const Eigen::Vector3d& p : {corner, Eigen::Vector3d(corner + along_u), Eigen::Vector3d(corner + along_u + along_v),
-                                   Eigen::Vector3d(corner + along_v)}) {
+  for (const Eigen::Vector3d& p : {corner, Eigen::Vector3d(corner + along_u),
+                                   Eigen::Vector3d(corner + along_u + along_v), Eigen::Vector3d(corner + along_v)}) {
     mesh().vertices.push_back(p);
   }
   const double u_size = along_u.norm(), v_size = along_v.norm();
@@ -78,7 +80,7 @@ void SceneBuilder::box(const SE3& pose, const Eigen::Vector3d& size_m, const Ski
   const double x = size_m.x() / 2, y = size_m.y() / 2, z = size_m.z();
   const Eigen::Matrix3d r = pose.rotation_matrix();
   const double longest = size_m.maxCoeff();
-  const double step = longest < 0.5 ? 0.5 : std::clamp(longest / 12, 0.06, 0.1);  // small things: light at the corners
+  const double step = longest < 0.5 ? 0.5 : std::clamp(longest / 9, 0.08, 0.14);  // small things: light at the corners
   auto face = [&](const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v, const Skin& skin) {
     quad(pose * corner, r * u, r * v, skin, step);
   };
@@ -203,7 +205,8 @@ void SceneBuilder::leaf(const Eigen::Vector3d& root, const Eigen::Vector3d& dire
 
 StaticScene SceneBuilder::finish(int threads) {
   std::vector<std::optional<Texture>> painted(paintings_.size());
-  parallel_for(static_cast<int>(painted.size()), threads, [&](int i, int) { painted[i].emplace(paintings_[i].paint(), paintings_[i].repeat); });
+  parallel_for(static_cast<int>(painted.size()), threads,
+               [&](int i, int) { painted[i].emplace(paintings_[i].paint(), paintings_[i].repeat); });
   for (auto& texture : painted) scene_.textures.push_back(std::move(*texture));
   std::vector<std::size_t> order(scene_.patches.size());  // by height: little waste on shelves
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;

@@ -14,8 +14,8 @@
 
 namespace semvslam::render {
 
-/// How a surface is painted: which image, and how many metres one image covers in each direction. A size of 0 stretches the
-/// image once over the surface.
+/// How a surface is painted: which image, and how many metres one image covers in each direction. A size of 0 stretches
+/// the image once over the surface.
 struct Skin {
   std::uint16_t texture = 0;
   Eigen::Vector2d image_size_m = Eigen::Vector2d::Zero();
@@ -56,11 +56,13 @@ class SceneBuilder {
   void begin_mesh();
   /// Index of the mesh that is being built.
   std::size_t mesh_index() const { return scene_.meshes.size() - 1; }
+  /// What has been built so far.
+  const std::vector<Mesh>& meshes() const { return scene_.meshes; }
 
-  /// A parallelogram; visible from where `along_u` to `along_v` turns counter-clockwise. The image's top is at the far end of
-  /// `along_v`. @param light_step_m distance of baked light values.
-  void quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& along_u, const Eigen::Vector3d& along_v, const Skin& skin,
-            double light_step_m = 0.1, bool emissive = false);
+  /// A parallelogram; visible from where `along_u` to `along_v` turns counter-clockwise. The image's top is at the far
+  /// end of `along_v`. @param light_step_m distance of baked light values.
+  void quad(const Eigen::Vector3d& corner, const Eigen::Vector3d& along_u, const Eigen::Vector3d& along_v,
+            const Skin& skin, double light_step_m = 0.1, bool emissive = false);
   /// A box centred on pose's origin in x and y, standing on it in z. `front` is the face towards -y, `top` towards +z.
   /// @param closed false leaves out the faces towards +y and -z, for things whose back nobody can see.
   void box(const SE3& pose, const Eigen::Vector3d& size_m, const Skin& sides, const Skin& front, const Skin& top,
@@ -69,10 +71,11 @@ class SceneBuilder {
   /// A solid of revolution around pose's z axis. @param profile (radius, height) from bottom to top.
   void lathe(const SE3& pose, const std::vector<Eigen::Vector2d>& profile, int segments, const Skin& skin);
   /// A tube along points of the world. @param radii_m one per point.
-  void tube(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& radii_m, int segments, const Skin& skin);
-  /// A pointed leaf, seen from both sides, that bends down along its length.
-  void leaf(const Eigen::Vector3d& root, const Eigen::Vector3d& direction, double length_m, double width_m, double droop,
+  void tube(const std::vector<Eigen::Vector3d>& points, const std::vector<double>& radii_m, int segments,
             const Skin& skin);
+  /// A pointed leaf, seen from both sides, that bends down along its length.
+  void leaf(const Eigen::Vector3d& root, const Eigen::Vector3d& direction, double length_m, double width_m,
+            double droop, const Skin& skin);
 
   /// Paints the textures, packs the light atlas (all texels 1) and hands everything over. The result does not depend on
   /// `threads`.

@@ -50,7 +50,8 @@ Status SceneOptions::check() const {
   if (width_px < 16 || width_px > 8192 || height_px < 16 || height_px > 8192) {
     return invalid(fmt::format("scene size {}x{}: both sides must be in 16..8192 pixels", width_px, height_px));
   }
-  if (frames < 1 || frames > 10'000'000) return invalid(fmt::format("scene option frames: {} is not in 1..10000000", frames));
+  if (frames < 1 || frames > 10'000'000)
+    return invalid(fmt::format("scene option frames: {} is not in 1..10000000", frames));
   if (!(frame_rate_hz >= 0.1 && frame_rate_hz <= 1000)) {
     return invalid(fmt::format("scene option frame_rate_hz: {} is not in 0.1..1000", frame_rate_hz));
   }
@@ -60,7 +61,11 @@ Status SceneOptions::check() const {
 
 struct RenderedScene::Impl {
   explicit Impl(const SceneOptions& chosen)
-      : options(chosen), camera(make_camera(chosen)), path(chosen.motion, chosen.seed), rasterizer(camera), sensor(camera) {
+      : options(chosen),
+        camera(make_camera(chosen)),
+        path(chosen.motion, chosen.seed),
+        rasterizer(camera),
+        sensor(camera) {
     SceneBuilder builder;
     const Room room = build_room(builder, options.seed);
     cast = std::make_unique<Cast>(options.people, options.seed, room.seats, builder, options.threads);
@@ -152,7 +157,8 @@ RenderedFrame RenderedScene::render(std::size_t index) {
 
 Trajectory RenderedScene::ground_truth() const {
   Trajectory poses;
-  for (int i = 0; i < impl_->options.frames; ++i) poses.push_back({impl_->stamp(i), impl_->path.pose(impl_->time_s(i))});
+  for (int i = 0; i < impl_->options.frames; ++i)
+    poses.push_back({impl_->stamp(i), impl_->path.pose(impl_->time_s(i))});
   return poses;
 }
 
@@ -167,7 +173,8 @@ class SceneFrameSource : public FrameSource {
     RenderedFrame rendered = scene_.render(next_++);
     if (with_mask_) {
       cv::Mat table(1, 256, CV_8UC1, cv::Scalar(0));
-      for (std::size_t i = 0; i < scene_.roles().size(); ++i) table.at<std::uint8_t>(static_cast<int>(i) + 1) = scene_.roles()[i].moves ? 255 : 0;
+      for (std::size_t i = 0; i < scene_.roles().size(); ++i)
+        table.at<std::uint8_t>(static_cast<int>(i) + 1) = scene_.roles()[i].moves ? 255 : 0;
       cv::LUT(rendered.instances, table, rendered.frame.mask);
     }
     return std::optional<RgbdFrame>(std::move(rendered.frame));
@@ -191,7 +198,8 @@ class SceneFrameSource : public FrameSource {
 Result<std::unique_ptr<FrameSource>> open_scene(const SceneOptions& options, bool truth_mask_as_frame_mask) {
   auto scene = RenderedScene::create(options);
   if (!scene) return scene.error();
-  return std::unique_ptr<FrameSource>(std::make_unique<SceneFrameSource>(std::move(scene).value(), truth_mask_as_frame_mask));
+  return std::unique_ptr<FrameSource>(
+      std::make_unique<SceneFrameSource>(std::move(scene).value(), truth_mask_as_frame_mask));
 }
 
 }  // namespace semvslam

@@ -21,8 +21,8 @@ struct SceneOptions {
   int frames = 300;
   double frame_rate_hz = 30;
   std::uint64_t seed = 1;  // of textures, clutter, persons, their ways, the camera's way and all noise
-  /// true: 16-bit depth with structured-light noise, image noise and vignetting. false: the exact picture, depth CV_32FC1
-  /// in metres.
+  /// true: 16-bit depth with structured-light noise, image noise and vignetting. false: the exact picture, depth
+  /// CV_32FC1 in metres.
   bool noise = true;
   bool motion_blur = false;  // exposure of half a frame time around the stamp
   int threads = 2;
@@ -46,7 +46,8 @@ struct SceneRole {
 };
 
 /// A furnished room with people in it, seen by a moving RGB-D camera. World frame: metres, z up, floor at z = 0.
-/// Depth is z in the camera frame along the ray through the centre of the pixel (pixel (0, 0) = centre of the top left one).
+/// Depth is z in the camera frame along the ray through the centre of the pixel (pixel (0, 0) = centre of the top left
+/// one).
 class RenderedScene {
  public:
   /// Builds the room, the persons and the camera's way. @return an Error for options that break SceneOptions::check().
@@ -58,7 +59,8 @@ class RenderedScene {
   const Camera& camera() const;
   const SceneOptions& options() const;
   const std::vector<SceneRole>& roles() const;
-  /// Frame number `index` in [0, options().frames); any order gives the same bytes. Not to be called by two threads at once.
+  /// Frame number `index` in [0, options().frames); any order gives the same bytes. Not to be called by two threads at
+  /// once.
   RenderedFrame render(std::size_t index);
   /// The pose of every frame at its stamp.
   Trajectory ground_truth() const;
@@ -69,8 +71,8 @@ class RenderedScene {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The frames of a scene in order. @param truth_mask_as_frame_mask fills RgbdFrame::mask with 255 where a role that moves is
-/// seen.
+/// The frames of a scene in order. @param truth_mask_as_frame_mask fills RgbdFrame::mask with 255 where a role that
+/// moves is seen.
 Result<std::unique_ptr<FrameSource>> open_scene(const SceneOptions& options, bool truth_mask_as_frame_mask = false);
 
 }  // namespace semvslam

@@ -84,7 +84,8 @@ TEST(RenderedScene, DepthIsInsideTheRoomsAndOnTheirPlanes) {
   EXPECT_GT(north, 3000);
 }
 
-/// Brightness and gradient of `to` where the points seen in `from` should be; the shift that explains the difference best.
+/// Brightness and gradient of `to` where the points seen in `from` should be; the shift that explains the difference
+/// best.
 struct Shift {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
   int pixels = 0;
@@ -101,7 +102,8 @@ Shift residual_shift(const Camera& camera, const RenderedFrame& from, const Rend
   auto bilinear = [](const cv::Mat& m, double x, double y) {
     const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
     const double a = x - x0, b = y - y0;
-    return (m.at<float>(y0, x0) * (1 - a) + m.at<float>(y0, x0 + 1) * a) * (1 - b) + (m.at<float>(y0 + 1, x0) * (1 - a) + m.at<float>(y0 + 1, x0 + 1) * a) * b;
+    return (m.at<float>(y0, x0) * (1 - a) + m.at<float>(y0, x0 + 1) * a) * (1 - b) +
+           (m.at<float>(y0 + 1, x0) * (1 - a) + m.at<float>(y0 + 1, x0 + 1) * a) * b;
   };
   for (int y = area.y; y < area.y + area.height; ++y) {
     for (int x = area.x; x < area.x + area.width; ++x) {
@@ -140,7 +142,8 @@ TEST(RenderedScene, ColourDepthAndPosesAgreeToAFiftiethOfAPixel) {
     EXPECT_LT(all.px.norm(), 0.02) << pair[0] << " -> " << pair[1];
     mean += all.px / kPairs;
     for (int i = 0; i < 4; ++i) {
-      const cv::Rect area(i % 2 * camera.width_px / 2, i / 2 * camera.height_px / 2, camera.width_px / 2, camera.height_px / 2);
+      const cv::Rect area(i % 2 * camera.width_px / 2, i / 2 * camera.height_px / 2, camera.width_px / 2,
+                          camera.height_px / 2);
       quarters[i] += residual_shift(camera, a, b, area).px / kPairs;
     }
   }
@@ -205,7 +208,8 @@ TEST(RenderedScene, DepthNoiseIsThatOfStructuredLight) {
   int holes = 0, off_step = 0;
   for (int y = 1; y < camera.height_px - 1; ++y) {
     for (int x = 1; x < camera.width_px - 1; ++x) {
-      const double z = b.frame.depth.at<float>(y, x), measured = a.frame.depth.at<std::uint16_t>(y, x) / camera.depth_units_per_m;
+      const double z = b.frame.depth.at<float>(y, x),
+                   measured = a.frame.depth.at<std::uint16_t>(y, x) / camera.depth_units_per_m;
       holes += measured == 0;
       if (measured == 0) continue;
       // Disparities come in eighths of a pixel, but for the rounding to depth units.
@@ -229,7 +233,7 @@ TEST(RenderedScene, DepthNoiseIsThatOfStructuredLight) {
     sigma[i] = std::sqrt(square);
     EXPECT_LT(std::abs(mean), 0.35 * sigma[i]);
   }
-  EXPECT_GT(sigma[1] / sigma[0], 5.0);   // (5 / 1.5)^2 = 11
+  EXPECT_GT(sigma[1] / sigma[0], 5.0);  // (5 / 1.5)^2 = 11
   EXPECT_LT(sigma[1] / sigma[0], 18.0);
   cv::Mat difference;
   cv::absdiff(a.frame.gray(cv::Rect(110, 80, 100, 80)), b.frame.gray(cv::Rect(110, 80, 100, 80)), difference);
@@ -263,7 +267,7 @@ TEST(CameraPath, MovesLikeAHand) {
 }
 
 TEST(RenderedScene, TourKeepsClearComesBackAndTellsTheTruth) {
-  SceneOptions options = small("none", "tour", false);
+  SceneOptions options = small("walking", "tour", false);
   options.width_px = 40;
   options.height_px = 30;
   options.frames = 10000;

@@ -44,12 +44,15 @@ const std::array<RestBone, kBones>& rest_bones() {
       const bool right = side > 0;
       const Eigen::Vector3d arm = rest_arm_direction(side), shoulder(side * 0.185, -0.012, 1.405);
       b[right ? kUpperArmR : kUpperArmL] = {kChest, shoulder, shoulder + 0.29 * arm};
-      b[right ? kForearmR : kForearmL] = {right ? kUpperArmR : kUpperArmL, shoulder + 0.29 * arm, shoulder + 0.545 * arm};
+      b[right ? kForearmR : kForearmL] = {right ? kUpperArmR : kUpperArmL, shoulder + 0.29 * arm,
+                                          shoulder + 0.545 * arm};
       b[right ? kHandR : kHandL] = {right ? kForearmR : kForearmL, shoulder + 0.545 * arm, shoulder + 0.72 * arm};
-      const Eigen::Vector3d hip(side * 0.09, 0, 0.92), knee(side * 0.105, 0.005, 0.50), ankle(side * 0.115, -0.02, 0.085);
+      const Eigen::Vector3d hip(side * 0.09, 0, 0.92), knee(side * 0.105, 0.005, 0.50),
+          ankle(side * 0.115, -0.02, 0.085);
       b[right ? kThighR : kThighL] = {kPelvis, hip, knee};
       b[right ? kShankR : kShankL] = {right ? kThighR : kThighL, knee, ankle};
-      b[right ? kFootR : kFootL] = {right ? kShankR : kShankL, ankle, ankle + Eigen::Vector3d(side * 0.012, 0.17, -0.045)};
+      b[right ? kFootR : kFootL] = {right ? kShankR : kShankL, ankle,
+                                    ankle + Eigen::Vector3d(side * 0.012, 0.17, -0.045)};
     }
     return b;
   }();
@@ -75,8 +78,8 @@ std::array<BoneMotion, kBones> solve_pose(const BodyPose& pose) {
 SkinWeights skin_weights(const Eigen::Vector3d& rest_point) {
   const auto& rest = rest_bones();
   // The flesh around a bone, so that the thick torso does not lose points to the thin arm.
-  static constexpr double kFlesh_m[kBones] = {0.12, 0.12, 0.14, 0.055, 0.09, 0.045, 0.036, 0.03, 0.045, 0.036, 0.03,
-                                              0.075, 0.05, 0.035, 0.075, 0.05, 0.035};
+  static constexpr double kFlesh_m[kBones] = {0.12,  0.12, 0.14,  0.055, 0.09,  0.045, 0.036, 0.03, 0.045,
+                                              0.036, 0.03, 0.075, 0.05,  0.035, 0.075, 0.05,  0.035};
   std::array<double, kBones> distance, weights{};
   int nearest = 0;
   for (int i = 0; i < kBones; ++i) {
@@ -117,7 +120,8 @@ void Skinner::apply(const SkinWeights& weights, const Eigen::Vector3d& rest_poin
   Eigen::Vector4d real = Eigen::Vector4d::Zero(), dual = Eigen::Vector4d::Zero();
   for (int i = 0; i < 4 && weights.weights[i] > 1e-4f; ++i) {
     const Dual& d = duals_[weights.bones[i]];
-    const double w = d.real.dot(first.real) < 0 ? -weights.weights[i] : weights.weights[i];  // the same half of the sphere
+    const double w =
+        d.real.dot(first.real) < 0 ? -weights.weights[i] : weights.weights[i];  // the same half of the sphere
     real += w * d.real;
     dual += w * d.dual;
   }

@@ -7,11 +7,26 @@
 
 namespace semvslam::render {
 
-/// Bones of a person. Person frame: metres, origin on the floor under the pelvis, x to the person's right, y forward, z up.
+/// Bones of a person. Person frame: metres, origin on the floor under the pelvis, x to the person's right, y forward, z
+/// up.
 enum Bone {
-  kPelvis, kSpine, kChest, kNeck, kHead,
-  kUpperArmR, kForearmR, kHandR, kUpperArmL, kForearmL, kHandL,
-  kThighR, kShankR, kFootR, kThighL, kShankL, kFootL,
+  kPelvis,
+  kSpine,
+  kChest,
+  kNeck,
+  kHead,
+  kUpperArmR,
+  kForearmR,
+  kHandR,
+  kUpperArmL,
+  kForearmL,
+  kHandL,
+  kThighR,
+  kShankR,
+  kFootR,
+  kThighL,
+  kShankL,
+  kFootL,
   kBones
 };
 

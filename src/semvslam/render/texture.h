@@ -9,8 +9,8 @@ namespace semvslam::render {
 /// Four floats that the compiler keeps in one register: blue, green, red, unused; display (gamma) values 0..255.
 using Colour4 = float __attribute__((vector_size(16)));
 
-/// A colour image with its pyramid of halved copies. Texel i of n covers [i / n, (i + 1) / n) of the coordinate, at every
-/// level, so filtering moves nothing.
+/// A colour image with its pyramid of halved copies. Texel i of n covers [i / n, (i + 1) / n) of the coordinate, at
+/// every level, so filtering moves nothing.
 class Texture {
  public:
   /// @param bgr CV_8UC3; sides are brought to powers of two. Coordinates outside [0, 1) repeat or clamp.
@@ -25,8 +25,8 @@ class Texture {
  private:
   struct Level {
     int width, height;
-    // B | G << 8 | R << 16; one column and one row more than the image, so that a texel's right and lower neighbours always
-    // follow it (wrapped or repeated).
+    // B | G << 8 | R << 16; one column and one row more than the image, so that a texel's right and lower neighbours
+    // always follow it (wrapped or repeated).
     std::vector<std::uint32_t> texels;
   };
   Colour4 bilinear(const Level& level, float u, float v) const;
