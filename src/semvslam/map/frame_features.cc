@@ -38,7 +38,7 @@ ObservationModel::ObservationModel(const Camera& camera, const NoiseModel& noise
     const double sigma_px = noise.pixel_sigma_px * scale;
     inverse_variance_px_.push_back(1.0 / (sigma_px * sigma_px));
   }
-  inverse_variance_disparity_ = 1.0 / (noise.disparity_sigma_px * noise.disparity_sigma_px);
+  inverse_variance_disparity_ = noise.disparity_weight / (noise.disparity_sigma_px * noise.disparity_sigma_px);
   inverse_log_factor_ = level_scales_.size() > 1 ? 1.f / std::log(level_scales_[1] / level_scales_[0]) : 0.f;
 }
 

@@ -9,7 +9,8 @@ namespace {
 
 template <typename Element, typename IdType>
 const Element* find_by_id(const std::vector<Element>& sorted, IdType id) {
-  const auto it = std::lower_bound(sorted.begin(), sorted.end(), id, [](const Element& e, IdType i) { return e.id < i; });
+  const auto it =
+      std::lower_bound(sorted.begin(), sorted.end(), id, [](const Element& e, IdType i) { return e.id < i; });
   return it != sorted.end() && it->id == id ? &*it : nullptr;
 }
 
@@ -37,7 +38,8 @@ std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, 
     near.emplace_back(distance, id);
   }
   std::sort(near.begin(), near.end());
-  if (near.size() > static_cast<std::size_t>(options.nearby_key_frames)) near.resize(static_cast<std::size_t>(options.nearby_key_frames));
+  if (near.size() > static_cast<std::size_t>(options.nearby_key_frames))
+    near.resize(static_cast<std::size_t>(options.nearby_key_frames));
   std::vector<KeyFrameId> ids;
   for (const auto& [distance, id] : near) ids.push_back(id);
   return ids;
@@ -65,7 +67,8 @@ std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId refere
     }
     local->key_frames.push_back({id, key_frame.camera_from_world, count});
   }
-  std::sort(local->key_frames.begin(), local->key_frames.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+  std::sort(local->key_frames.begin(), local->key_frames.end(),
+            [](const auto& a, const auto& b) { return a.id < b.id; });
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   if (ids.size() > static_cast<std::size_t>(options.max_points))
@@ -76,9 +79,8 @@ std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId refere
     local->points.push_back({id, l.position, l.normal, l.min_distance_m, l.max_distance_m, l.descriptor,
                              static_cast<int>(l.observations.size())});
   }
-  const std::size_t wanted = std::min<std::size_t>(3, map.key_frames().size());
   for (const LandmarkId landmark : map.key_frame(reference)->landmarks)
-    if (landmark.valid() && map.landmark(landmark)->observations.size() >= wanted) ++local->reference_matches;
+    if (landmark.valid()) ++local->reference_matches;
   local->fused = map.recent_fusions();
   return local;
 }

@@ -8,8 +8,8 @@
 
 namespace semvslam {
 
-/// The bounded neighbourhood of the newest key frame that tracking works on: an immutable copy, so that mapping can go on
-/// editing the map meanwhile. Its size does not grow with the length of the run.
+/// The bounded neighbourhood of the newest key frame that tracking works on: an immutable copy, so that mapping can go
+/// on editing the map meanwhile. Its size does not grow with the length of the run.
 struct LocalMap {
   struct Point {
     LandmarkId id;
@@ -25,19 +25,19 @@ struct LocalMap {
     int landmarks = 0;  // that it sees
   };
 
-  KeyFrameId reference;                                    // the key frame it was made around
-  int reference_matches = 0;                               // landmarks of the reference seen by at least three key frames
-  std::vector<Point> points;                               // ascending by id
-  std::vector<KeyFramePose> key_frames;                    // ascending by id, the reference included
-  std::vector<std::pair<LandmarkId, LandmarkId>> fused;    // recent fusions (from, into), ascending
+  KeyFrameId reference;                                  // the key frame it was made around
+  int reference_matches = 0;                             // landmarks that the reference sees
+  std::vector<Point> points;                             // ascending by id
+  std::vector<KeyFramePose> key_frames;                  // ascending by id, the reference included
+  std::vector<std::pair<LandmarkId, LandmarkId>> fused;  // recent fusions (from, into), ascending
 
   const Point* find(LandmarkId id) const;
   const KeyFramePose* find(KeyFrameId id) const;
 };
 
 struct LocalMapOptions {
-  int covisible_key_frames = 20;   // by shared landmarks
-  int nearby_key_frames = 10;      // by place and viewing direction: old places come back before any loop is closed
+  int covisible_key_frames = 20;  // by shared landmarks
+  int nearby_key_frames = 10;     // by place and viewing direction: old places come back before any loop is closed
   double nearby_distance_m = 1.0;
   double nearby_angle_deg = 40;
   int max_points = 6000;

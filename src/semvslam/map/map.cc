@@ -107,7 +107,8 @@ void Map::refresh_landmark(LandmarkId id) {
   for (std::size_t i = 0; i < n; ++i) {
     const Descriptor& candidate = descriptor_of(point.observations[first + i]);
     int sum = 0;
-    for (std::size_t j = 0; j < n; ++j) sum += hamming_distance(candidate, descriptor_of(point.observations[first + j]));
+    for (std::size_t j = 0; j < n; ++j)
+      sum += hamming_distance(candidate, descriptor_of(point.observations[first + j]));
     if (sum < best_sum) {
       best_sum = sum;
       point.descriptor = candidate;
@@ -193,16 +194,18 @@ Status Map::check_invariants() const {
   std::size_t from_key_frames = 0, from_landmarks = 0;
   for (const auto& [id, key_frame] : key_frames_) {
     if (key_frame.id != id) return broken(fmt::format("key frame {} stored under {}", key_frame.id.value, id.value));
-    if (!key_frame.camera_from_world.is_finite()) return broken(fmt::format("key frame {} has a pose that is not finite", id.value));
+    if (!key_frame.camera_from_world.is_finite())
+      return broken(fmt::format("key frame {} has a pose that is not finite", id.value));
     if (key_frame.landmarks.size() != key_frame.features->size())
-      return broken(fmt::format("key frame {} has {} landmark slots for {} features", id.value, key_frame.landmarks.size(),
-                                key_frame.features->size()));
+      return broken(fmt::format("key frame {} has {} landmark slots for {} features", id.value,
+                                key_frame.landmarks.size(), key_frame.features->size()));
     for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i) {
       if (!key_frame.landmarks[i].valid()) continue;
       ++from_key_frames;
       const Landmark* point = landmark(key_frame.landmarks[i]);
       const Observation expected{id, static_cast<std::uint32_t>(i)};
-      if (point == nullptr || std::find(point->observations.begin(), point->observations.end(), expected) == point->observations.end())
+      if (point == nullptr ||
+          std::find(point->observations.begin(), point->observations.end(), expected) == point->observations.end())
         return broken(fmt::format("feature {} of key frame {} names landmark {} which does not know it", i, id.value,
                                   key_frame.landmarks[i].value));
     }
@@ -210,17 +213,20 @@ Status Map::check_invariants() const {
   for (const auto& [id, point] : landmarks_) {
     if (point.id != id) return broken(fmt::format("landmark {} stored under {}", point.id.value, id.value));
     if (point.observations.empty()) return broken(fmt::format("landmark {} is seen by nobody", id.value));
-    if (!point.position.allFinite()) return broken(fmt::format("landmark {} has a position that is not finite", id.value));
+    if (!point.position.allFinite())
+      return broken(fmt::format("landmark {} has a position that is not finite", id.value));
     for (std::size_t i = 0; i < point.observations.size(); ++i) {
       ++from_landmarks;
       if (i > 0 && point.observations[i - 1].key_frame >= point.observations[i].key_frame)
         return broken(fmt::format("observations of landmark {} are not ascending by key frame", id.value));
       if (!key_frames_.contains(point.observations[i].key_frame))
-        return broken(fmt::format("landmark {} is seen by key frame {} which is gone", id.value, point.observations[i].key_frame.value));
+        return broken(fmt::format("landmark {} is seen by key frame {} which is gone", id.value,
+                                  point.observations[i].key_frame.value));
     }
   }
   if (from_key_frames != from_landmarks)
-    return broken(fmt::format("{} observations seen from key frames, {} from landmarks", from_key_frames, from_landmarks));
+    return broken(
+        fmt::format("{} observations seen from key frames, {} from landmarks", from_key_frames, from_landmarks));
   return Status::success();
 }
 

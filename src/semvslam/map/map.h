@@ -33,7 +33,7 @@ struct Landmark {
   Descriptor descriptor{};                             // the observation that is nearest to all others
   std::vector<Observation> observations;               // ascending by key frame
   KeyFrameId first_key_frame;
-  int visible = 1, found = 1;                          // frames in which it should have been / was seen
+  int visible = 1, found = 1;  // frames in which it should have been / was seen
 };
 
 /// An image that the map keeps.
@@ -52,8 +52,9 @@ struct Covisible {
   int shared = 0;  // landmarks in common
 };
 
-/// Key frames and landmarks as values keyed by id; observations indexed from both sides, kept consistent by going through
-/// this class for every change. One writer (the mapping stage); no locks inside. Iteration order never depends on addresses.
+/// Key frames and landmarks as values keyed by id; observations indexed from both sides, kept consistent by going
+/// through this class for every change. One writer (the mapping stage); no locks inside. Iteration order never depends
+/// on addresses.
 class Map {
  public:
   explicit Map(std::shared_ptr<const ObservationModel> model) : model_(std::move(model)) {}
@@ -62,8 +63,8 @@ class Map {
 
   KeyFrameId add_key_frame(FrameId frame, TimeStamp stamp, const SE3& camera_from_world,
                            std::shared_ptr<const FrameFeatures> features);
-  /// Removes a key frame with its observations; landmarks that nobody sees any more go too. Its pose stays known relative to
-  /// `anchor` (see camera_from_world), so that the frames tracked against it keep theirs.
+  /// Removes a key frame with its observations; landmarks that nobody sees any more go too. Its pose stays known
+  /// relative to `anchor` (see camera_from_world), so that the frames tracked against it keep theirs.
   void remove_key_frame(KeyFrameId id, KeyFrameId anchor);
 
   LandmarkId add_landmark(const Eigen::Vector3d& position, KeyFrameId key_frame, std::uint32_t feature);
@@ -75,7 +76,9 @@ class Map {
   /// Removes one observation; a landmark left without any is removed.
   void remove_observation(LandmarkId landmark, KeyFrameId key_frame);
 
-  void set_pose(KeyFrameId id, const SE3& camera_from_world) { key_frames_.at(id).camera_from_world = camera_from_world; }
+  void set_pose(KeyFrameId id, const SE3& camera_from_world) {
+    key_frames_.at(id).camera_from_world = camera_from_world;
+  }
   void set_position(LandmarkId id, const Eigen::Vector3d& p) { landmarks_.at(id).position = p; }
   void count_visible(LandmarkId id, int visible, int found);
   /// Recomputes descriptor, normal and distance limits from the observations.
@@ -92,7 +95,8 @@ class Map {
   /// Pose of a key frame, also of one that was removed (through its anchor). Empty for ids never given out.
   std::optional<SE3> camera_from_world(KeyFrameId id) const;
 
-  /// Key frames that share at least `min_shared` landmarks with `id`, most first (ties: newer first). Computed on demand.
+  /// Key frames that share at least `min_shared` landmarks with `id`, most first (ties: newer first). Computed on
+  /// demand.
   std::vector<Covisible> covisible(KeyFrameId id, int min_shared) const;
 
   const std::map<KeyFrameId, KeyFrame>& key_frames() const { return key_frames_; }

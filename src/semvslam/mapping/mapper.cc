@@ -44,10 +44,12 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
 }
 
 KeyFrameId Mapper::insert(const NewKeyFrame& key_frame) {
-  const KeyFrameId id = map_.add_key_frame(key_frame.frame, key_frame.stamp, key_frame.camera_from_world, key_frame.features);
+  const KeyFrameId id =
+      map_.add_key_frame(key_frame.frame, key_frame.stamp, key_frame.camera_from_world, key_frame.features);
   for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i) {
     const LandmarkId landmark = map_.resolve(key_frame.landmarks[i]);
-    if (landmark.valid() && map_.add_observation(landmark, id, static_cast<std::uint32_t>(i))) map_.refresh_landmark(landmark);
+    if (landmark.valid() && map_.add_observation(landmark, id, static_cast<std::uint32_t>(i)))
+      map_.refresh_landmark(landmark);
   }
   return id;
 }
@@ -89,7 +91,8 @@ std::vector<KeyFrameId> Mapper::fusion_partners(KeyFrameId id) const {
   }
   // Key frames of an earlier visit share no landmark yet: that is what fusing them is for.
   for (const KeyFrameId near : nearby_key_frames(map_, id, options_.local_map, partners)) {
-    if (partners.size() >= static_cast<std::size_t>(options_.fuse_key_frames + options_.local_map.nearby_key_frames)) break;
+    if (partners.size() >= static_cast<std::size_t>(options_.fuse_key_frames + options_.local_map.nearby_key_frames))
+      break;
     partners.push_back(near);
   }
   return partners;
@@ -140,7 +143,8 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
     sources.push_back(id);
     in_camera.push_back(p);
   }
-  match_projected(queries_, features.orb, features.grid, {.max_distance = 50, .ratio = 1.f, .check_rotation = false}, matches_);
+  match_projected(queries_, features.orb, features.grid, {.max_distance = 50, .ratio = 1.f, .check_rotation = false},
+                  matches_);
   for (const Match& m : matches_) {
     const auto q = static_cast<std::size_t>(m.query);
     const auto f = static_cast<std::size_t>(m.feature);
@@ -148,7 +152,7 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
     if ((camera.project(in_camera[q]) - o.pixel).squaredNorm() * o.inverse_variance_px > 5.991) continue;
     if (o.disparity_px > 0) {
       const double residual = o.disparity_px - model.intrinsics().focal_baseline_px_m / in_camera[q].z();
-      if (residual * residual * o.inverse_variance_disparity > 6.63) continue;
+      if (residual * residual * o.inverse_variance_disparity > 2 * model.chi2_disparity()) continue;
     }
     const LandmarkId existing = key_frame.landmarks[f];
     if (!existing.valid()) {
@@ -159,9 +163,17 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
     const Landmark* b = map_.landmark(existing);
     if (a == nullptr || a == b) continue;
     // The one that more key frames know survives.
-    if (a->observations.size() > b->observations.size()) map_.fuse_landmarks(existing, sources[q]);
-    else map_.fuse_landmarks(sources[q], existing);
+    if (a->observations.size() > b->observations.size())
+      map_.fuse_landmarks(existing, sources[q]);
+    else
+      map_.fuse_landmarks(sources[q], existing);
   }
+}
+
+void Mapper::adjust_all(std::stop_token stop) {
+  std::vector<KeyFrameId> window;
+  for (const auto& [id, key_frame] : map_.key_frames()) window.push_back(id);
+  if (window.size() > 1) adjust(window, stop);
 }
 
 void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
@@ -170,6 +182,10 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
     if (window.size() >= static_cast<std::size_t>(options_.bundle_key_frames)) break;
     window.push_back(c.key_frame);
   }
+  adjust(window, stop);
+}
+
+void Mapper::adjust(const std::vector<KeyFrameId>& window, std::stop_token stop) {
   std::vector<LandmarkId> landmarks;
   for (const KeyFrameId k : window)
     for (const LandmarkId l : map_.key_frame(k)->landmarks)
@@ -184,8 +200,10 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
       if (std::find(window.begin(), window.end(), o.key_frame) == window.end()) ++outside[o.key_frame];
   std::vector<std::pair<int, KeyFrameId>> ranked;
   for (const auto& [key_frame, count] : outside) ranked.emplace_back(count, key_frame);
-  std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second > b.second; });
-  if (ranked.size() > static_cast<std::size_t>(options_.bundle_fixed_key_frames)) ranked.resize(static_cast<std::size_t>(options_.bundle_fixed_key_frames));
+  std::sort(ranked.begin(), ranked.end(),
+            [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second > b.second; });
+  if (ranked.size() > static_cast<std::size_t>(options_.bundle_fixed_key_frames))
+    ranked.resize(static_cast<std::size_t>(options_.bundle_fixed_key_frames));
 
   BaProblem problem;
   problem.camera = map_.model().intrinsics();
@@ -196,7 +214,8 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
     problem.poses.push_back(map_.key_frame(k)->camera_from_world);
     problem.pose_fixed.push_back(fixed ? 1 : 0);
   };
-  for (const KeyFrameId k : window) add_pose(k, k == oldest || (ranked.empty() && k == *std::min_element(window.begin(), window.end())));
+  for (const KeyFrameId k : window)
+    add_pose(k, k == oldest || (ranked.empty() && k == *std::min_element(window.begin(), window.end())));
   for (const auto& [count, k] : ranked) add_pose(k, true);
   std::vector<Observation> edge_source;
   std::vector<LandmarkId> edge_landmark;
@@ -207,13 +226,15 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
     for (const Observation& o : landmark.observations) {
       const auto it = index_of.find(o.key_frame);
       if (it == index_of.end()) continue;
-      problem.edges.push_back({it->second, point, map_.model().observation(*map_.key_frame(o.key_frame)->features, o.feature)});
+      problem.edges.push_back(
+          {it->second, point, map_.model().observation(*map_.key_frame(o.key_frame)->features, o.feature)});
       edge_source.push_back(o);
       edge_landmark.push_back(l);
     }
   }
   std::vector<std::uint8_t> edge_inlier;
-  const BaSummary summary = adjust_bundle(problem, {}, edge_inlier, stop);
+  const BaSummary summary =
+      adjust_bundle(problem, {.chi2_disparity = map_.model().chi2_disparity()}, edge_inlier, stop);
   if (!summary.usable) return;
   for (const KeyFrameId k : window) map_.set_pose(k, problem.poses[index_of.at(k)]);
   for (std::size_t i = 0; i < landmarks.size(); ++i) map_.set_position(landmarks[i], problem.points[i]);
@@ -234,7 +255,9 @@ bool Mapper::is_redundant(const KeyFrame& key_frame) const {
     for (const Observation& o : landmark.observations) {
       if (o.key_frame == key_frame.id) continue;
       // An observation on a coarser level is no full substitute.
-      if (map_.key_frame(o.key_frame)->features->orb.keypoints[o.feature].level <= key_frame.features->orb.keypoints[i].level + 1) ++others;
+      if (map_.key_frame(o.key_frame)->features->orb.keypoints[o.feature].level <=
+          key_frame.features->orb.keypoints[i].level + 1)
+        ++others;
       if (others >= 3) break;
     }
     redundant += others >= 3;

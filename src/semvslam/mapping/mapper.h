@@ -12,15 +12,16 @@
 namespace semvslam {
 
 struct MappingOptions {
-  double max_landmark_depth_m = 6.0;    // landmarks are made from depth up to here
-  double min_found_ratio = 0.25;        // found / visible below which a young landmark goes
-  int young_key_frames = 3;             // a landmark must have three observations after so many key frames
-  int fuse_key_frames = 12;             // neighbours in which the new key frame's landmarks are searched, and vice versa
-  double fuse_radius_px = 3;            // at level 0
-  int bundle_key_frames = 10;           // optimised in a local bundle adjustment
-  int bundle_fixed_key_frames = 20;     // that hold it in place
-  int min_shared = 15;                  // landmarks that make two key frames neighbours
-  double redundant_ratio = 0.9;         // a key frame goes when this share of its landmarks is seen in three others
+  double max_landmark_depth_m = 6.0;  // landmarks are made from depth up to here
+  double min_found_ratio = 0.25;      // found / visible below which a young landmark goes
+  int young_key_frames = 3;           // a landmark must have three observations after so many key frames
+  int fuse_key_frames = 12;           // neighbours in which the new key frame's landmarks are searched, and vice versa
+  double fuse_radius_px = 3;          // at level 0
+  int bundle_key_frames = 20;         // optimised in a local bundle adjustment
+  int bundle_fixed_key_frames = 40;   // that hold it in place
+  int final_bundles = 2;         // full bundle adjustments when the run ends; the second without the first's outliers
+  int min_shared = 15;           // landmarks that make two key frames neighbours
+  double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others
   LocalMapOptions local_map;
 };
 
@@ -46,6 +47,8 @@ class Mapper {
 
   /// @return the snapshot that tracking goes on with.
   std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});
+  /// Full bundle adjustment over every key frame and landmark.
+  void adjust_all(std::stop_token stop = {});
   void count_visible(LandmarkId id, int visible, int found) { map_.count_visible(id, visible, found); }
 
   const Map& map() const { return map_; }
@@ -60,6 +63,9 @@ class Mapper {
   /// Searches landmarks in a key frame's image; adds observations and fuses duplicates.
   void fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target);
   void adjust_neighbourhood(KeyFrameId id, std::stop_token stop);
+  /// Bundle adjustment of the key frames in `window` and all landmarks they see; others that see them hold them in
+  /// place.
+  void adjust(const std::vector<KeyFrameId>& window, std::stop_token stop);
   void cull_key_frames(KeyFrameId newest);
   bool is_redundant(const KeyFrame& key_frame) const;
 

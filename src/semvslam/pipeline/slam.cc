@@ -10,8 +10,9 @@
 
 namespace semvslam {
 
-// Ownership: the tracker belongs to the thread of process(), the mapper to the mapping stage (its own thread, or the calling
-// one when deterministic). Between them: a bounded queue of requests one way, a slot with the newest local map the other.
+// Ownership: the tracker belongs to the thread of process(), the mapper to the mapping stage (its own thread, or the
+// calling one when deterministic). Between them: a bounded queue of requests one way, a slot with the newest local map
+// the other.
 struct Slam::Impl {
   Impl(const Config& c, const Camera& camera)
       : config(c),
@@ -57,6 +58,7 @@ struct Slam::Impl {
   std::vector<Record> records;
   std::uint64_t frames = 0, lost = 0;
   FrameId next_frame{0};
+  bool finished = false;
 };
 
 void Slam::Impl::map_key_frame(KeyFrameRequest request) {
@@ -65,7 +67,8 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
     std::lock_guard lock(map_mutex);
     NewKeyFrame key_frame{request.frame, request.stamp, {}, std::move(request.features), std::move(request.landmarks)};
     if (request.reference.valid())
-      key_frame.camera_from_world = request.camera_from_reference * mapper.map().camera_from_world(request.reference).value();
+      key_frame.camera_from_world =
+          request.camera_from_reference * mapper.map().camera_from_world(request.reference).value();
     for (const LandmarkUse& use : request.uses) mapper.count_visible(use.landmark, use.visible, use.found);
     local = mapper.step(key_frame);
     const MappingTimes& t = mapper.times();
@@ -135,13 +138,19 @@ Result<TrackResult> Slam::process(const RgbdFrame& input) {
   Impl& s = *impl_;
   const Camera& camera = s.model->camera();
   const cv::Size size(camera.width_px, camera.height_px);
-  const auto invalid = [&](const std::string& what) { return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", s.next_frame.value, what)}; };
+  const auto invalid = [&](const std::string& what) {
+    return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", s.next_frame.value, what)};
+  };
   if (input.gray.type() != CV_8UC1 || input.gray.size() != size)
-    return invalid(fmt::format("the grey image must be 8-bit and {}x{}, it is {}x{}", size.width, size.height, input.gray.cols, input.gray.rows));
-  if (!input.depth.empty() && (input.depth.size() != size || (input.depth.type() != CV_16UC1 && input.depth.type() != CV_32FC1)))
-    return invalid(fmt::format("the depth image must be 16-bit or float and {}x{}, it is {}x{}", size.width, size.height, input.depth.cols, input.depth.rows));
+    return invalid(fmt::format("the grey image must be 8-bit and {}x{}, it is {}x{}", size.width, size.height,
+                               input.gray.cols, input.gray.rows));
+  if (!input.depth.empty() &&
+      (input.depth.size() != size || (input.depth.type() != CV_16UC1 && input.depth.type() != CV_32FC1)))
+    return invalid(fmt::format("the depth image must be 16-bit or float and {}x{}, it is {}x{}", size.width,
+                               size.height, input.depth.cols, input.depth.rows));
   if (!input.mask.empty() && (input.mask.size() != size || input.mask.type() != CV_8UC1))
-    return invalid(fmt::format("the mask must be 8-bit and {}x{}, it is {}x{}", size.width, size.height, input.mask.cols, input.mask.rows));
+    return invalid(fmt::format("the mask must be 8-bit and {}x{}, it is {}x{}", size.width, size.height,
+                               input.mask.cols, input.mask.rows));
   if (Status status = s.failure_status(); !status) return status.error();
 
   RgbdFrame frame = input;
@@ -180,7 +189,14 @@ Result<TrackResult> Slam::process(const RgbdFrame& input) {
 Status Slam::finish() {
   impl_->requests.close();
   if (impl_->mapping_thread.joinable()) impl_->mapping_thread.join();
-  return impl_->failure_status();
+  Status status = impl_->failure_status();
+  if (status && !impl_->finished) {
+    impl_->finished = true;
+    std::lock_guard lock(impl_->map_mutex);
+    const auto timer = impl_->timers["mapping.final_bundle"].time();
+    for (int i = 0; i < impl_->config.mapping.final_bundles; ++i) impl_->mapper.adjust_all();
+  }
+  return status;
 }
 
 Trajectory Slam::trajectory() const {
@@ -197,14 +213,16 @@ Trajectory Slam::trajectory() const {
 Trajectory Slam::key_frame_trajectory() const {
   std::lock_guard lock(impl_->map_mutex);
   Trajectory trajectory;
-  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames()) trajectory.push_back({key_frame.stamp, key_frame.camera_from_world.inverse()});
+  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames())
+    trajectory.push_back({key_frame.stamp, key_frame.camera_from_world.inverse()});
   return trajectory;
 }
 
 std::vector<Eigen::Vector3d> Slam::landmark_positions() const {
   std::lock_guard lock(impl_->map_mutex);
   std::vector<Eigen::Vector3d> positions;
-  for (const LandmarkId id : impl_->mapper.map().landmark_ids()) positions.push_back(impl_->mapper.map().landmark(id)->position);
+  for (const LandmarkId id : impl_->mapper.map().landmark_ids())
+    positions.push_back(impl_->mapper.map().landmark(id)->position);
   return positions;
 }
 

@@ -20,13 +20,14 @@ namespace semvslam {
 /// Where the mask that a frame was tracked with came from.
 enum class MaskSource { kNone, kGiven };
 
-/// What is known about a frame the moment it has been tracked. Mapping may improve the pose later: see Slam::trajectory().
+/// What is known about a frame the moment it has been tracked. Mapping may improve the pose later: see
+/// Slam::trajectory().
 struct TrackResult {
   FrameId frame;
   TimeStamp stamp;
   TrackingState state = TrackingState::kInitializing;
-  SE3 world_from_camera;   // metres; world = camera of the first key frame. While lost: the last known pose
-  int inliers = 0;         // landmarks that agree with the pose
+  SE3 world_from_camera;  // metres; world = camera of the first key frame. While lost: the last known pose
+  int inliers = 0;        // landmarks that agree with the pose
   bool is_key_frame = false;
   MaskSource mask_source = MaskSource::kNone;
   double tracking_ms = 0;  // frame in to pose out
@@ -56,7 +57,8 @@ class Slam {
   /// Tracks one frame. Image sizes must be the camera's: anything else is an Error and the frame is not used.
   Result<TrackResult> process(const RgbdFrame& frame);
   void add_sink(std::shared_ptr<Sink> sink);
-  /// Waits until mapping has worked off what it was given. @return what went wrong in any stage.
+  /// Waits until mapping has worked off what it was given, then adjusts the whole map once more
+  /// (mapping.final_bundles); further calls do nothing. @return what went wrong in any stage.
   Status finish();
 
   /// Poses (world_from_camera) of all tracked frames with everything that mapping has learnt since, by time.

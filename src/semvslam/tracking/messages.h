@@ -23,10 +23,10 @@ struct KeyFrameRequest {
   FrameId frame;
   TimeStamp stamp;
   std::shared_ptr<const FrameFeatures> features;
-  std::vector<LandmarkId> landmarks;   // per feature; invalid = none
-  KeyFrameId reference;                // invalid for the first key frame of a map
-  SE3 camera_from_reference;           // stays true when mapping moves the reference meanwhile
-  std::vector<LandmarkUse> uses;       // since the previous request
+  std::vector<LandmarkId> landmarks;  // per feature; invalid = none
+  KeyFrameId reference;               // invalid for the first key frame of a map
+  SE3 camera_from_reference;          // stays true when mapping moves the reference meanwhile
+  std::vector<LandmarkUse> uses;      // since the previous request
 };
 
 /// The pose of a frame relative to the key frame that it was tracked against.

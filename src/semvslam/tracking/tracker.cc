@@ -9,7 +9,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
 
 bool inside(const Camera& camera, const Eigen::Vector2d& pixel) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width_px && pixel.y() < camera.height_px;
@@ -50,7 +52,9 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const Loca
   const Clock::time_point motion_start = Clock::now();
   bool ok = false;
   if (last_.features) {
-    if (has_velocity_) ok = track_motion(velocity_ * last_.camera_from_world, 1.0) || track_motion(velocity_ * last_.camera_from_world, 2.5);
+    if (has_velocity_)
+      ok = track_motion(velocity_ * last_.camera_from_world, 1.0) ||
+           track_motion(velocity_ * last_.camera_from_world, 2.5);
     if (!ok) ok = track_motion(last_.camera_from_world, has_velocity_ ? 4.0 : 2.0);
   }
   if (!ok) ok = track_descriptors();
@@ -65,7 +69,8 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const Loca
     output.state = TrackingState::kTracking;
     output.camera_from_world = current_.camera_from_world;
     const SE3 reference = local_->find(local_->reference)->camera_from_world;
-    last_relative_ = output.relative = RelativePose{local_->reference, current_.camera_from_world * reference.inverse()};
+    last_relative_ = output.relative =
+        RelativePose{local_->reference, current_.camera_from_world * reference.inverse()};
     has_velocity_ = last_.features != nullptr;
     if (has_velocity_) velocity_ = current_.camera_from_world * last_.camera_from_world.inverse();
     if (may_request && wants_key_frame(output.inliers, frame.id)) output.key_frame = make_request(frame);
@@ -130,7 +135,8 @@ bool Tracker::track_motion(const SE3& predicted, double radius_factor) {
     const Eigen::Vector2d pixel = camera.project(in_camera);
     if (!inside(camera, pixel)) continue;
     const Keypoint& keypoint = last.orb.keypoints[i];
-    const float radius = static_cast<float>(options_.motion_radius_px * radius_factor) * model_->level_scale(keypoint.level);
+    const float radius =
+        static_cast<float>(options_.motion_radius_px * radius_factor) * model_->level_scale(keypoint.level);
     queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, keypoint.level - 1,
                         keypoint.level + 1, last.orb.descriptors[i], keypoint.angle_rad});
     query_source_.push_back(static_cast<int>(i));
@@ -159,7 +165,8 @@ bool Tracker::track_descriptors() {
   if (!last_.features) return false;
   const FrameFeatures& last = *last_.features;
   const SE3 world_from_last = last_.camera_from_world.inverse();
-  match_brute_force(last.orb.descriptors, current_.features->orb.descriptors, {.max_distance = 50, .ratio = 0.8f}, matches_);
+  match_brute_force(last.orb.descriptors, current_.features->orb.descriptors, {.max_distance = 50, .ratio = 0.8f},
+                    matches_);
   candidates_.clear();
   for (const Match& m : matches_) {
     const auto i = static_cast<std::size_t>(m.query);
@@ -178,8 +185,9 @@ bool Tracker::track_descriptors() {
 
 int Tracker::estimate_pose(Candidates& candidates, SE3& camera_from_world) {
   if (candidates.points.size() < 10) return 0;
-  const PoseEstimate estimate = optimize_pose(model_->intrinsics(), camera_from_world, candidates.points,
-                                              candidates.observations, {}, inlier_);
+  const PoseEstimate estimate =
+      optimize_pose(model_->intrinsics(), camera_from_world, candidates.points, candidates.observations,
+                    {.chi2_disparity = model_->chi2_disparity()}, inlier_);
   camera_from_world = estimate.camera_from_world;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < candidates.points.size(); ++i) {
@@ -202,27 +210,6 @@ int Tracker::track_local_map() {
   const SE3& pose = current_.camera_from_world;
   const Eigen::Vector3d centre = pose.inverse().translation();
   std::vector<LandmarkId> visible, found;
-  // What frame-to-frame matching found stays; its landmarks and features are not searched again.
-  std::vector<std::uint8_t> feature_taken(current_.features->size(), 0);
-  std::vector<LandmarkId> known;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < candidates_.points.size(); ++i) {
-    const LandmarkId id = candidates_.landmarks[i];
-    if (!id.valid()) continue;  // temporary points served for the prediction; a landmark may take their feature now
-    feature_taken[static_cast<std::size_t>(candidates_.features[i])] = 1;
-    known.push_back(id);
-    candidates_.points[kept] = candidates_.points[i];
-    candidates_.observations[kept] = candidates_.observations[i];
-    candidates_.features[kept] = candidates_.features[i];
-    candidates_.landmarks[kept] = id;
-    ++kept;
-  }
-  candidates_.points.resize(kept);
-  candidates_.observations.resize(kept);
-  candidates_.features.resize(kept);
-  candidates_.landmarks.resize(kept);
-  std::sort(known.begin(), known.end());
-
   queries_.clear();
   query_source_.clear();
   for (std::size_t k = 0; k < local_->points.size(); ++k) {
@@ -237,7 +224,6 @@ int Tracker::track_local_map() {
     const double cosine = ray.dot(point.normal.cast<double>()) / distance;
     if (cosine < options_.min_view_cosine) continue;
     visible.push_back(point.id);
-    if (std::binary_search(known.begin(), known.end(), point.id)) continue;
     const int level = model_->predict_level(point.max_distance_m / distance);
     const float radius = static_cast<float>(options_.local_map_radius_px) * model_->level_scale(level);
     queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, level - 1, level + 1,
@@ -246,9 +232,10 @@ int Tracker::track_local_map() {
   }
   match_projected(queries_, current_.features->orb, current_.features->grid,
                   {.max_distance = options_.max_distance_bits, .ratio = 0.8f, .check_rotation = false}, matches_);
+  candidates_.clear();
   for (const Match& m : matches_) {
-    if (feature_taken[static_cast<std::size_t>(m.feature)]) continue;
-    const LocalMap::Point& point = local_->points[static_cast<std::size_t>(query_source_[static_cast<std::size_t>(m.query)])];
+    const LocalMap::Point& point =
+        local_->points[static_cast<std::size_t>(query_source_[static_cast<std::size_t>(m.query)])];
     candidates_.points.push_back(point.position);
     candidates_.observations.push_back(model_->observation(*current_.features, static_cast<std::size_t>(m.feature)));
     candidates_.features.push_back(m.feature);
@@ -301,7 +288,8 @@ KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
   }
   request.uses.reserve(uses_.size());
   for (const auto& [id, use] : uses_) request.uses.push_back({id, use.visible, use.found});
-  std::sort(request.uses.begin(), request.uses.end(), [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
+  std::sort(request.uses.begin(), request.uses.end(),
+            [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
   uses_.clear();
   last_key_frame_ = frame.id;
   return request;

@@ -15,18 +15,18 @@
 namespace semvslam {
 
 struct TrackingOptions {
-  int min_initial_points = 150;        // features with depth that a first key frame needs
-  int min_inliers = 20;                // fewer landmarks agreeing with the pose: lost
-  double motion_radius_px = 15;        // search window of frame-to-frame matching, at level 0
-  double local_map_radius_px = 4;      // search window of local-map matching, at level 0
-  int max_distance_bits = 80;          // descriptors farther apart never match
-  double min_view_cosine = 0.5;        // a landmark seen from a direction farther off is not searched
-  double key_frame_ratio = 0.75;       // new key frame when fewer than this share of the reference's landmarks is tracked
-  int min_tracked_close = 100;         // ... or fewer close landmarks than this are tracked while more than
-  int min_new_close = 70;              // this many close features have none
+  int min_initial_points = 150;    // features with depth that a first key frame needs
+  int min_inliers = 20;            // fewer landmarks agreeing with the pose: lost
+  double motion_radius_px = 15;    // search window of frame-to-frame matching, at level 0
+  double local_map_radius_px = 4;  // search window of local-map matching, at level 0
+  int max_distance_bits = 80;      // descriptors farther apart never match
+  double min_view_cosine = 0.5;    // a landmark seen from a direction farther off is not searched
+  double key_frame_ratio = 0.6;    // new key frame when fewer than this share of the reference's landmarks is tracked
+  int min_tracked_close = 100;     // ... or fewer close landmarks than this are tracked while more than
+  int min_new_close = 70;          // this many close features have none
   double close_depth_m = 3.5;
-  int max_frames_between = 30;         // ... or so many frames have passed
-  int min_frames_between = 0;          // never sooner than this
+  int max_frames_between = 30;  // ... or so many frames have passed
+  int min_frames_between = 0;   // never sooner than this
 };
 
 /// Milliseconds that one step spent, by part.
@@ -34,16 +34,16 @@ struct TrackingTimes {
   double extract_ms = 0, motion_ms = 0, local_map_ms = 0, total_ms = 0;
 };
 
-/// The camera's pose for every frame, from features matched to the previous frame and to the local map. Pure state machine:
-/// no threads, no clock in any decision; the same calls give the same results.
+/// The camera's pose for every frame, from features matched to the previous frame and to the local map. Pure state
+/// machine: no threads, no clock in any decision; the same calls give the same results.
 class Tracker {
  public:
   struct Output {
     TrackingState state = TrackingState::kInitializing;
     SE3 camera_from_world;
-    std::optional<RelativePose> relative;       // absent until the first key frame is in the map, and while lost
-    int inliers = 0;                            // landmarks that agree with the pose
-    std::optional<KeyFrameRequest> key_frame;   // present when this frame should be kept
+    std::optional<RelativePose> relative;      // absent until the first key frame is in the map, and while lost
+    int inliers = 0;                           // landmarks that agree with the pose
+    std::optional<KeyFrameRequest> key_frame;  // present when this frame should be kept
     TrackingTimes times;
   };
 
@@ -54,16 +54,16 @@ class Tracker {
   Output step(const RgbdFrame& frame, std::shared_ptr<const LocalMap> local, bool may_request);
 
  private:
-  struct Tracked {                              // the frame that is being or was last tracked
+  struct Tracked {  // the frame that is being or was last tracked
     std::shared_ptr<FrameFeatures> features;
-    std::vector<LandmarkId> landmarks;          // per feature
+    std::vector<LandmarkId> landmarks;  // per feature
     SE3 camera_from_world;
   };
-  struct Candidates {                           // correspondences that the pose is estimated from
+  struct Candidates {  // correspondences that the pose is estimated from
     std::vector<Eigen::Vector3d> points;
     std::vector<PointObservation> observations;
     std::vector<int> features;
-    std::vector<LandmarkId> landmarks;          // invalid: a temporary point of the previous frame
+    std::vector<LandmarkId> landmarks;  // invalid: a temporary point of the previous frame
     void clear();
   };
 
@@ -83,10 +83,10 @@ class Tracker {
   OrbExtractor extractor_;
   std::shared_ptr<const LocalMap> local_;
   Tracked current_, last_;
-  SE3 velocity_;                                // current_from_last
+  SE3 velocity_;  // current_from_last
   bool has_velocity_ = false;
   std::optional<RelativePose> last_relative_;
-  bool waiting_for_map_ = false;                // the first request was made
+  bool waiting_for_map_ = false;  // the first request was made
   FrameId last_key_frame_;
   std::unordered_map<LandmarkId, LandmarkUse> uses_;
 
