@@ -215,7 +215,7 @@ class ProgramTest(unittest.TestCase):
         self.expect_error(call("eval", file("one.txt", "1 0 0 0 0 0 0 1\n"), truth), 3, "1 poses")
         self.expect_error(call("eval", file("nan.txt", "\n".join(lines[:5]) + "\n9 nan 0 0 0 0 0 1\n"), truth), 3, "nan.txt:6")
         self.expect_error(call("eval", file("zero.txt", "1 0 0 0 0 0 0 0\n"), truth), 3, "zero.txt:1")
-        far = "".join(f"{i} {i} {i * i} 0 0 0 0 1\n" for i in range(5))
+        far = "".join(f"{1000 + i} {i} {i * i} 0 0 0 0 1\n" for i in range(5))
         self.expect_error(call("eval", truth, file("far.txt", far)), 3, "no pose of the estimate")
         self.expect_error(call("eval", truth, truth, "--delta", "1h"), 3, "delta")
         self.expect_error(call("eval", truth, truth, "--plot", self.folder / "no" / "x.svg"), 4)

@@ -33,6 +33,7 @@ int run(int argc, char** argv) {
     handlers.emplace_back(parser, command.setup(*parser));
   }
   const CLI::App* help = program.add_subcommand("help", "show this help");
+  const std::string help_text = program.help();  // after parsing, it would be that of the parsed sub-command
 
   try {
     program.parse(argc, argv);
@@ -46,7 +47,7 @@ int run(int argc, char** argv) {
     const Result<int> result = handler();
     return result ? *result : fail(exit_code_of(result.error().code), result.error().message);
   }
-  fmt::print("{}", program.help());
+  fmt::print("{}", help_text);
   return help->parsed() ? kExitSuccess : kExitUsage;
 }
 
