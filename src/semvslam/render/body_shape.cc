@@ -127,7 +127,8 @@ ImplicitShape top_shape(const PersonLook& look) {
   s.cone({-0.072f * shoulder, -0.012f, 1.30f}, 0.108f * g + c, {0.072f * shoulder, -0.012f, 1.30f}, 0.108f * g + c,
          0.05f, kForward, 1.05f);
   s.cone({-0.058f, -0.004f, 1.10f}, waist + c, {0.058f, -0.004f, 1.10f}, waist + c, 0.09f);
-  s.cone({-0.066f, -0.006f, 0.95f}, hip + c + 0.008f, {0.066f, -0.006f, 0.95f}, hip + c + 0.008f, 0.09f);
+  const float hem = look.skirt ? hip - 0.012f : hip + c + 0.014f;  // tucked in, or hanging over the trousers
+  s.cone({-0.066f, -0.006f, 0.95f}, hem, {0.066f, -0.006f, 0.95f}, hem, 0.09f);
   s.cone({-0.150f * shoulder, -0.016f, 1.402f}, 0.050f + c, {0.150f * shoulder, -0.016f, 1.402f}, 0.050f + c, 0.06f);
   for (const float x : {-1.f, 1.f}) {
     s.cone({x * 0.02f, -0.024f, 1.47f}, 0.045f + c, {x * 0.13f, -0.018f, 1.425f}, 0.035f + c, 0.05f);
@@ -197,9 +198,10 @@ ImplicitShape trousers_shape(const PersonLook& look) {
 ImplicitShape skirt_shape(const PersonLook& look) {
   ImplicitShape s;
   const float g = static_cast<float>(look.girth);
-  s.cone({-0.06f, 0, 1.03f}, 0.088f * g, {0.06f, 0, 1.03f}, 0.088f * g, 0.04f);
-  s.cone({-0.068f, -0.012f, 0.93f}, 0.122f * g, {0.068f, -0.012f, 0.93f}, 0.122f * g, 0.06f);
+  s.cone({-0.06f, -0.004f, 1.05f}, 0.104f * g, {0.06f, -0.004f, 1.05f}, 0.104f * g, 0.04f);
+  s.cone({-0.068f, -0.012f, 0.93f}, 0.126f * g, {0.068f, -0.012f, 0.93f}, 0.126f * g, 0.06f);
   s.cone({0, 0, 0.90f}, 0.185f * g, {0, 0, 0.50f}, 0.225f * g, 0.06f, kForward, 1.25f);
+  s.cut({0, 0, 1.045f}, Vector3f::UnitZ());
   s.cut({0, 0, 0.53f}, -Vector3f::UnitZ());
   const std::uint32_t seed = static_cast<std::uint32_t>(look.seed >> 11);
   s.displace([seed](const Vector3f& p) {
