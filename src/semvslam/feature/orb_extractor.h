@@ -15,7 +15,7 @@ struct OrbOptions {
   int fast_threshold = 20;     // grey levels
   int fast_threshold_low = 7;  // in cells where the first finds nothing
   int cell_px = 32;            // side of the cells that corners are spread over
-  bool subpixel = true;        // refine corners by a parabola through the corner score
+  bool subpixel = true;  // move corners to the peak of Harris' score, between the pixels (see corner_refinement.h)
 };
 
 /// Scale factor^level for every level of `options`.

@@ -6,6 +6,10 @@
 
 #include "semvslam/feature/brief_pattern.h"
 
+// Vectors wider than the target's registers are passed in another way than with wider ones: of no matter within one
+// file.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace semvslam {
 namespace {
 
