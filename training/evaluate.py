@@ -50,7 +50,8 @@ def open_model(path, size, threads=2):
         return infer.Segmenter(t), t.names
     with open(os.path.join(path, "model.json")) as f:
         m = json.load(f)
-    return infer.Segmenter(infer.OpenVino(path, threads, trunk=m["trunk"], box=m["box"], mask=m["mask"])), m["classes"]
+    graphs = infer.OpenVino(path, threads, trunk=m["trunk"], box=m["box"], mask=m["mask"])
+    return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"]), m["classes"]
 
 
 def iou(a, b):

@@ -172,6 +172,7 @@ def about(state, out, size, trunk, box, mask):
             "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
             "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
             "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
+            "semantic_share": 0.5, "mask_threshold": 0.48,
             "training": {"steps": state["step"], "images_seen": state["seen"]}, "sha256": {f: sha(os.path.join(out, f)) for f in files}}
 
 

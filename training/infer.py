@@ -99,23 +99,40 @@ def roi_align(levels, boxes, cells, thresholds):
     return out
 
 
-def paste(prob, box, size):
-    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image: bilinear, 0 beyond the 28 x 28 cells."""
+def bilinear(table, v, u):
+    """table [h, w] read at rows v, columns u, clamped to the edges."""
+    h, w = table.shape
+    u, v = np.clip(u, 0, w - 1), np.clip(v, 0, h - 1)
+    iu, iv = np.minimum(np.floor(u).astype(int), w - 2), np.minimum(np.floor(v).astype(int), h - 2)
+    fu, fv = (u - iu).astype(np.float32)[None, :], (v - iv).astype(np.float32)[:, None]
+    rows0, rows1 = table[iv], table[iv + 1]
+    top = rows0[:, iu] * (1 - fu) + rows0[:, iu + 1] * fu
+    low = rows1[:, iu] * (1 - fu) + rows1[:, iu + 1] * fu
+    return top * (1 - fv) + low * fv
+
+
+def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share=0.0):
+    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image, and the mask's support.
+
+    Bilinear, 0 beyond the 28 x 28 cells. With `semantic` [h, w] at stride 8 the two probabilities are mixed by `share`; support is the
+    mean semantic probability of the mask's pixels (1 without).
+    """
     x0, y0 = max(0, math.floor(box[0])), max(0, math.floor(box[1]))
     x1, y1 = min(size[1], math.ceil(box[2])), min(size[0], math.ceil(box[3]))
     if x1 <= x0 or y1 <= y0:
-        return 0, 0, np.zeros((0, 0), bool)
+        return (0, 0, np.zeros((0, 0), bool)), 1.0
     n = prob.shape[0]
-    u = ((np.arange(x0, x1) + 0.5 - box[0]) / max(box[2] - box[0], 1e-3) * n - 0.5).astype(np.float32)
-    v = ((np.arange(y0, y1) + 0.5 - box[1]) / max(box[3] - box[1], 1e-3) * n - 0.5).astype(np.float32)
+    x, y = np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5
+    u = ((x - box[0]) / max(box[2] - box[0], 1e-3) * n - 0.5).astype(np.float32)
+    v = ((y - box[1]) / max(box[3] - box[1], 1e-3) * n - 0.5).astype(np.float32)
     padded = np.zeros((n + 2, n + 2), np.float32)
     padded[1:-1, 1:-1] = prob
-    iu, iv = np.clip(np.floor(u), -1, n - 1).astype(int), np.clip(np.floor(v), -1, n - 1).astype(int)
-    fu, fv = np.clip(u - iu, 0, 1)[None, :], np.clip(v - iv, 0, 1)[:, None]
-    rows0, rows1 = padded[iv + 1], padded[iv + 2]
-    top = rows0[:, iu + 1] * (1 - fu) + rows0[:, iu + 2] * fu
-    low = rows1[:, iu + 1] * (1 - fu) + rows1[:, iu + 2] * fu
-    return x0, y0, top * (1 - fv) + low * fv >= 0.5
+    p = bilinear(padded, v + 1, u + 1)
+    if semantic is None:
+        return (x0, y0, p >= threshold), 1.0
+    s = bilinear(semantic, y * scale[1] / STRIDES[0] - 0.5, x * scale[0] / STRIDES[0] - 0.5)
+    mask = (1 - share) * p + share * s >= threshold
+    return (x0, y0, mask), float(s[mask].mean()) if mask.any() else 0.0
 
 
 class OpenVino:
@@ -146,8 +163,8 @@ class OpenVino:
 
 
 class Segmenter:
-    def __init__(self, graphs):
-        self.g = graphs
+    def __init__(self, graphs, share=0.5, threshold=0.48):
+        self.g, self.share, self.threshold = graphs, share, threshold
         H, W = graphs.size
         self.anchors = [anchors(i, H // s, W // s) for i, s in enumerate(STRIDES)]
         self.times = {}
@@ -187,7 +204,9 @@ class Segmenter:
         o = self.g.box(r)
         t0 = self.lap("box", t0)
         boxes = decode(o["deltas"] / BOX_WEIGHTS, prop, self.g.size)
-        n, c = np.nonzero(o["probabilities"][:, 1:] >= least)
+        floor = np.full(o["probabilities"].shape[1] - 1, least, np.float32)
+        floor[0] = max(0.02, least * least)                # what support 1 would lift to `least`
+        n, c = np.nonzero(o["probabilities"][:, 1:] >= floor)
         b, s = boxes[n], o["probabilities"][n, c + 1]
         ok = (b[:, 2] - b[:, 0] >= 2) & (b[:, 3] - b[:, 1] >= 2)
         b, s, c = b[ok], s[ok], c[ok]
@@ -201,11 +220,19 @@ class Segmenter:
         m = self.g.mask(r)["masks"]
         t0 = self.lap("mask", t0)
         out = []
+        semantic = np.ascontiguousarray(t["semantic"][0, :, :, 0])
         for i in range(len(b)):
             box = b[i] / np.array([fx, fy, fx, fy], np.float32)
             box = np.minimum(box, np.array([bgr.shape[1], bgr.shape[0]] * 2, np.float32))
-            out.append({"class": int(c[i]), "score": float(s[i]), "box": box,
-                        "window": paste(m[i, 0 if c[i] == 0 else 1], box, bgr.shape[:2])})
+            score = float(s[i])
+            if c[i] == 0:                                  # persons: the two branches of the network vote together
+                window, support = paste(m[i, 0], box, bgr.shape[:2], self.threshold, semantic, (fx, fy), self.share)
+                score = math.sqrt(score * support)
+            else:
+                window, _ = paste(m[i, 1], box, bgr.shape[:2])
+            if score >= least and window[2].any():
+                out.append({"class": int(c[i]), "score": score, "box": box, "window": window})
+        out.sort(key=lambda i: -i["score"])
         self.lap("paste", t0)
         return out
 
@@ -239,7 +266,8 @@ def main():
     o = a.parse_args()
     with open(os.path.join(o.models, "model.json")) as f:
         about = json.load(f)
-    s = Segmenter(OpenVino(o.models, o.threads, trunk=about["trunk"], box=about["box"], mask=about["mask"]))
+    s = Segmenter(OpenVino(o.models, o.threads, trunk=about["trunk"], box=about["box"], mask=about["mask"]),
+                  about["semantic_share"], about["mask_threshold"])
     for path in o.images:
         bgr = cv2.imread(path)
         if bgr is None:

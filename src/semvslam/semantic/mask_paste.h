@@ -8,11 +8,22 @@ namespace semvslam {
 
 /// A mask in the part of an image that it covers.
 struct PastedMask {
-  cv::Rect window;  // inside the image; empty when the box is
-  cv::Mat mask;     // CV_8UC1, 255 = inside
+  cv::Rect window;    // inside the image; empty when the box is
+  cv::Mat mask;       // CV_8UC1, 255 = inside
+  float support = 1;  // mean probability that the hint gives the mask's pixels; 1 without a hint
 };
 
-/// Stretches side x side probabilities over a box: bilinear, zero beyond the outermost cells, inside where >= 0.5.
-PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& box, cv::Size image);
+/// A coarse map of the probability that a pixel belongs to the object's kind, and how much it counts.
+struct SemanticHint {
+  const float* data = nullptr;  // of cell (x, y): data[(y * columns + x) * step]
+  int rows = 0, columns = 0, step = 1;
+  float cells_per_px_x = 0, cells_per_px_y = 0;
+  float share = 0;  // 0 = the mask alone, 1 = the hint alone
+};
+
+/// Stretches side x side probabilities over a box: bilinear, zero beyond the outermost cells; mixed with the hint where
+/// there is one; inside where >= threshold.
+PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& box, cv::Size image,
+                      float threshold = 0.5f, const SemanticHint* hint = nullptr);
 
 }  // namespace semvslam

@@ -39,9 +39,13 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.box_levels = j.at("box_levels").get<std::vector<float>>();
   m.mask_levels = j.at("mask_levels").get<std::vector<float>>();
   m.channels = j.at("feature_channels").get<int>();
+  m.semantic_share = j.at("semantic_share").get<float>();
+  m.mask_threshold = j.at("mask_threshold").get<float>();
   check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096,
         "'input' is no usable size");
   check(!m.classes.empty(), "'classes' is empty");
+  check(m.semantic_share >= 0 && m.semantic_share <= 1, "'semantic_share' is not within 0 .. 1");
+  check(m.mask_threshold > 0 && m.mask_threshold < 1, "'mask_threshold' is not within 0 .. 1");
   check(m.channels > 0 && m.channels <= 4096, "'feature_channels' is out of range");
   check(!m.anchor_ratios.empty() && !m.anchor_sizes[0].empty(), "no anchors");
   for (const auto& sizes : m.anchor_sizes)

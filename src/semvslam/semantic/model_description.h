@@ -24,6 +24,8 @@ struct ModelDescription {
   std::array<float, 4> box_weights{};
   std::vector<float> box_levels, mask_levels;
   int channels = 0;
+  float semantic_share = 0;     // weight of the semantic map in a person's mask
+  float mask_threshold = 0.5f;  // of a person's mixed mask
 
   int anchors_per_cell() const { return static_cast<int>(anchor_sizes[0].size() * anchor_ratios.size()); }
 

@@ -19,7 +19,12 @@ struct TrunkLevel {
   std::span<const float> objectness;  // one per anchor
   std::span<const float> deltas;      // four per anchor
 };
-using TrunkOutput = std::array<TrunkLevel, ModelDescription::kLevels>;
+struct TrunkOutput {
+  std::array<TrunkLevel, ModelDescription::kLevels> levels;
+  /// Probabilities at the finest level's cells, kSemanticChannels a cell: person, other mover, movable.
+  std::span<const float> semantic;
+  static constexpr int kSemanticChannels = 3;
+};
 
 /// What the box head says of some regions; memory of the graphs, valid until its next call.
 struct BoxHeadOutput {

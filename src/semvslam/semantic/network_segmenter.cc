@@ -9,6 +9,7 @@
 namespace semvslam {
 namespace {
 
+constexpr float kLeastPersonScore = 0.02f;
 constexpr float kLeastProposalSide = 4, kLeastObjectSide = 2;  // px of the network's input
 
 bool finite(std::span<const float> values) {
@@ -59,16 +60,16 @@ Result<std::vector<DetectionBox>> NetworkSegmenter::propose(const TrunkOutput& t
   const auto lap = timers_["segment.proposals"].time();
   std::vector<DetectionBox> boxes;
   std::vector<float> scores;
-  for (std::size_t l = 0; l < trunk.size(); ++l) {
-    if (!finite(trunk[l].objectness)) return not_finite("objectness");
-    for (const int i : largest(trunk[l].objectness, limits_.proposals_per_level)) {
-      const float* deltas = &trunk[l].deltas[static_cast<std::size_t>(i) * 4];
+  for (std::size_t l = 0; l < trunk.levels.size(); ++l) {
+    if (!finite(trunk.levels[l].objectness)) return not_finite("objectness");
+    for (const int i : largest(trunk.levels[l].objectness, limits_.proposals_per_level)) {
+      const float* deltas = &trunk.levels[l].deltas[static_cast<std::size_t>(i) * 4];
       if (!finite({deltas, 4})) return not_finite("proposals");
       const DetectionBox box = decode_box(deltas, anchors_[l][i], {1, 1, 1, 1}, static_cast<float>(model_.input.width),
                                           static_cast<float>(model_.input.height));
       if (box.width() < kLeastProposalSide || box.height() < kLeastProposalSide) continue;
       boxes.push_back(box);
-      scores.push_back(trunk[l].objectness[i]);
+      scores.push_back(trunk.levels[l].objectness[i]);
     }
   }
   std::vector<DetectionBox> out;
@@ -79,7 +80,7 @@ Result<std::vector<DetectionBox>> NetworkSegmenter::propose(const TrunkOutput& t
 
 void NetworkSegmenter::align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels,
                                     int cells, float* to) const {
-  roi_align(trunk[roi_level(box, levels)].features, model_.channels, box, cells, to);
+  roi_align(trunk.levels[roi_level(box, levels)].features, model_.channels, box, cells, to);
 }
 
 Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const TrunkOutput& trunk,
@@ -99,6 +100,8 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
              used_d = head->deltas.first(proposals.size() * 4);
   if (!finite(used_p) || !finite(used_d)) return not_finite("classes or boxes");
 
+  // A person's final score is the root of this one times the support of its mask: what full support would lift passes.
+  const float person_floor = std::max(kLeastPersonScore, limits_.score * limits_.score);
   std::vector<std::vector<Object>> by_class(classes);
   for (std::size_t n = 0; n < proposals.size(); ++n) {
     const DetectionBox box =
@@ -106,7 +109,7 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
                    static_cast<float>(model_.input.height));
     if (box.width() < kLeastObjectSide || box.height() < kLeastObjectSide) continue;
     for (std::size_t c = 0; c < classes; ++c)
-      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= limits_.score)
+      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= (c == 0 ? person_floor : limits_.score))
         by_class[c].push_back({box, static_cast<int>(c), p});
   }
   for (const std::vector<Object>& candidates : by_class) {
@@ -128,6 +131,11 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
                               float scale_y, Segmentation& out) {
   const auto lap = timers_["segment.masks"].time();
   const auto width = static_cast<float>(out.size.width), height = static_cast<float>(out.size.height);
+  if (!finite(trunk.semantic)) return not_finite("semantic map");
+  const FeatureMap& finest = trunk.levels[0].features;
+  const auto stride = static_cast<float>(finest.stride);
+  const SemanticHint hint{trunk.semantic.data(), finest.rows,      finest.columns,       TrunkOutput::kSemanticChannels,
+                          scale_x / stride,      scale_y / stride, model_.semantic_share};
   const std::span<float> input = graphs_->mask_input();
   const std::size_t region = input.size() / NetworkGraphs::kMaskBatch;
   constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
@@ -146,20 +154,26 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
       if (!finite(mask)) return not_finite("masks");
       const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
                              std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
-      PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size);
-      if (pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
+      const bool person = o.class_index == 0;
+      PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
+                                     person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
+      const float score = person ? std::sqrt(o.score * pasted.support) : o.score;
+      if (!(score >= limits_.score) || pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
       Instance i;
-      i.id = InstanceId(static_cast<std::uint32_t>(out.instances.size()));
       i.class_index = o.class_index;
       i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
       i.role = roles_.role(i.class_name);
-      i.score = o.score;
+      i.score = score;
       i.box = {box.x0, box.y0, box.width(), box.height()};
       i.window = pasted.window;
       i.mask = pasted.mask;
       out.instances.push_back(std::move(i));
     }
   }
+  std::stable_sort(out.instances.begin(), out.instances.end(),
+                   [](const Instance& a, const Instance& b) { return a.score > b.score; });
+  for (std::size_t n = 0; n < out.instances.size(); ++n)
+    out.instances[n].id = InstanceId(static_cast<std::uint32_t>(n));
   return Status::success();
 }
 

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -26,8 +27,11 @@ class FakeGraphs final : public NetworkGraphs {
       level_[l].features.assign(cells * model.channels, 0.f);
       level_[l].objectness.assign(cells * model.anchors_per_cell(), -5.f);
       level_[l].deltas.assign(cells * model.anchors_per_cell() * 4, 0.f);
-      out_[l] = {{level_[l].features.data(), rows, columns, model.strides[l]}, level_[l].objectness, level_[l].deltas};
+      out_.levels[l] = {
+          {level_[l].features.data(), rows, columns, model.strides[l]}, level_[l].objectness, level_[l].deltas};
     }
+    semantic_.assign(static_cast<std::size_t>(model.input.area()) / 64 * TrunkOutput::kSemanticChannels, 1.f);
+    out_.semantic = semantic_;
     box_in_.resize(static_cast<std::size_t>(kBoxBatch) * kBoxCells * kBoxCells * model.channels);
     mask_in_.resize(static_cast<std::size_t>(kMaskBatch) * kMaskCells * kMaskCells * model.channels);
     probabilities_.assign(kBoxBatch * (classes_ + 1), 0.f);
@@ -45,7 +49,7 @@ class FakeGraphs final : public NetworkGraphs {
     std::vector<float> features, objectness, deltas;
   };
   std::array<Level, 3> level_;
-  std::vector<float> probabilities_, deltas_, masks_;
+  std::vector<float> probabilities_, deltas_, masks_, semantic_;
 
  private:
   std::size_t classes_;
@@ -89,7 +93,7 @@ TEST(NetworkSegmenter, AnAnchorThatIsSureBecomesAnInstanceInImagePixels) {
   const Instance& i = s->instances[0];
   EXPECT_EQ(i.class_name, "person");
   EXPECT_EQ(i.role, Role::kDynamic);
-  EXPECT_FLOAT_EQ(i.score, 0.8f);
+  EXPECT_FLOAT_EQ(i.score, std::sqrt(0.8f));  // the semantic map supports all of it
   EXPECT_EQ(i.box, cv::Rect2f(32, 32, 128, 128));
   EXPECT_EQ(i.window, cv::Rect(32, 32, 128, 128));
 }

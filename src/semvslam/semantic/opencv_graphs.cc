@@ -27,17 +27,22 @@ class OpenCvGraphs final : public NetworkGraphs {
       std::vector<cv::String> names;
       for (const char* kind : {"p", "objectness", "deltas"})
         for (int l = 3; l < 3 + ModelDescription::kLevels; ++l) names.push_back(fmt::format("{}{}", kind, l));
+      names.emplace_back("semantic");
       outputs_.clear();
       trunk_.forward(outputs_, names);
       TrunkOutput out;
-      for (std::size_t l = 0; l < out.size(); ++l) {
+      for (std::size_t l = 0; l < out.levels.size(); ++l) {
         const int stride = model_.strides[l], rows = model_.input.height / stride,
                   columns = model_.input.width / stride;
         const std::size_t cells = static_cast<std::size_t>(rows) * columns, anchors = cells * model_.anchors_per_cell();
-        out[l].features = {numbers(outputs_[l], cells * model_.channels, names[l]).data(), rows, columns, stride};
-        out[l].objectness = numbers(outputs_[l + 3], anchors, names[l + 3]);
-        out[l].deltas = numbers(outputs_[l + 6], anchors * 4, names[l + 6]);
+        out.levels[l].features = {numbers(outputs_[l], cells * model_.channels, names[l]).data(), rows, columns,
+                                  stride};
+        out.levels[l].objectness = numbers(outputs_[l + 3], anchors, names[l + 3]);
+        out.levels[l].deltas = numbers(outputs_[l + 6], anchors * 4, names[l + 6]);
       }
+      const std::size_t finest =
+          static_cast<std::size_t>(model_.input.height / model_.strides[0]) * (model_.input.width / model_.strides[0]);
+      out.semantic = numbers(outputs_.back(), finest * TrunkOutput::kSemanticChannels, names.back());
       return out;
     });
   }

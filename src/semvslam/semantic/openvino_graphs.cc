@@ -52,7 +52,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
         });
         !s)
       return s.error();
-    return levels_;
+    return trunk_out_;
   }
 
   std::span<float> box_input() override { return input(box_); }
@@ -126,16 +126,20 @@ class OpenVinoGraphs final : public NetworkGraphs {
       throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
     }
     const auto a = static_cast<std::size_t>(model_.anchors_per_cell());
-    for (std::size_t l = 0; l < levels_.size(); ++l) {
+    for (std::size_t l = 0; l < trunk_out_.levels.size(); ++l) {
       const int stride = model_.strides[l], rows = model_.input.height / stride, columns = model_.input.width / stride;
       const auto r = static_cast<std::size_t>(rows), c = static_cast<std::size_t>(columns);
       const auto part = [&](const char* name, std::size_t channels) {
         return output(trunk_, model_.trunk, fmt::format("{}{}", name, l + 3), {1, r, c, channels});
       };
-      levels_[l].features = {part("p", static_cast<std::size_t>(model_.channels)).data(), rows, columns, stride};
-      levels_[l].objectness = part("objectness", a);
-      levels_[l].deltas = part("deltas", a * 4);
+      trunk_out_.levels[l].features = {part("p", static_cast<std::size_t>(model_.channels)).data(), rows, columns,
+                                       stride};
+      trunk_out_.levels[l].objectness = part("objectness", a);
+      trunk_out_.levels[l].deltas = part("deltas", a * 4);
     }
+    const auto r = static_cast<std::size_t>(model_.input.height / model_.strides[0]),
+               c = static_cast<std::size_t>(model_.input.width / model_.strides[0]);
+    trunk_out_.semantic = output(trunk_, model_.trunk, "semantic", {1, r, c, TrunkOutput::kSemanticChannels});
   }
 
   static ov::InferRequest load_head(const std::filesystem::path& file, const Shape& shape, const ov::AnyMap& options) {
@@ -172,7 +176,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
 
   ModelDescription model_;
   ov::InferRequest trunk_, box_, mask_;
-  TrunkOutput levels_;
+  TrunkOutput trunk_out_;
   std::span<const float> probabilities_, box_deltas_, masks_;
 };
 

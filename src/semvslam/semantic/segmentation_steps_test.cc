@@ -62,6 +62,16 @@ TEST(SegmentationSteps, PastingGivesTheReferencesPixels) {
   for (int y = 0; y < pasted.mask.rows; ++y)
     differing += std::abs(cv::countNonZero(pasted.mask.row(y)) - wanted.at("row_counts")[y].get<int>());
   EXPECT_LE(differing, 3);  // a value of 0.5 sharp may fall to either side
+
+  const nlohmann::json mixed = wanted.at("mixed");
+  std::vector<float> semantic;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) semantic.push_back(static_cast<float>((5 * y + 3 * x) % 17) / 16.f);
+  const SemanticHint hint{semantic.data(), 48, 64, 1, 2.f / 8, 2.5f / 8, 0.5f};
+  const PastedMask both = paste_mask(probabilities.data(), 28, box_of(wanted.at("box")),
+                                     {wanted.at("width"), wanted.at("height")}, 0.48f, &hint);
+  EXPECT_NEAR(cv::countNonZero(both.mask), mixed.at("pixels").get<int>(), 3);
+  EXPECT_NEAR(both.support, mixed.at("support").get<float>(), 2e-3);
 }
 
 TEST(SegmentationSteps, SuppressionAndDecodingAgreeWithTheReference) {
