@@ -8,6 +8,7 @@
 #include "semvslam/render/furniture.h"
 #include "semvslam/render/noise.h"
 #include "semvslam/render/paint.h"
+#include "semvslam/render/parallel.h"
 
 namespace semvslam::render {
 namespace {
@@ -188,40 +189,52 @@ void Cast::add_occluders(const Placement& placement, const std::array<BoneMotion
 }
 
 void Cast::arrange(double time_s, const Eigen::Vector3d& eye, const LightModel& light, std::vector<Mesh>& meshes,
-                   std::vector<Occluder>& occluders) const {
+                   std::vector<Occluder>& occluders, int threads) const {
   meshes.clear();
   occluders.clear();
-  for (const Member& member : members_) {
-    const Placement placement = member.walks ? walker(member, time_s) : sitter(member, time_s);
-    const auto motions = solve_pose(placement.pose);
-    const double scale = member.person->scale();
-    add_occluders(placement, motions, scale, occluders);
-    const Eigen::Vector3d middle = placement.world_from_person * Eigen::Vector3d(0, 0, 1.1);
-    const std::array<float, 6> cube = light.cube(middle);
-    meshes.emplace_back();
-    meshes.back().role = static_cast<std::uint8_t>(member.role);
-    member.person->pose(motions, placement.world_from_person, cube, (middle - eye).norm() < kFineDistance_m,
-                        meshes.back());
-    if (member.item == Item::kNone) continue;
-    Mesh item = member.item_shape;
-    item.role = static_cast<std::uint8_t>(member.item_role);
-    const double lift = placement.pose.pelvis.z() - rest_bones()[kPelvis].joint.z();
-    const Eigen::Vector3d bob(0, 0, member.item == Item::kSuitcase ? 0.0 : lift);
-    const double item_scale = member.item == Item::kSuitcase ? 1.0 : scale;
-    for (Eigen::Vector3d& v : item.vertices) v = placement.world_from_person * Eigen::Vector3d(item_scale * (v + bob));
-    for (Triangle& t : item.triangles) {
-      const Eigen::Vector3d &a = item.vertices[t.corners[0].vertex], &b = item.vertices[t.corners[1].vertex],
-                            &c = item.vertices[t.corners[2].vertex];
-      const Eigen::Vector3d n = (b - a).cross(c - a).normalized();
-      float sum = 0;
-      for (int axis = 0; axis < 3; ++axis)
-        sum += static_cast<float>(n[axis] * n[axis]) * cube[2 * axis + (n[axis] < 0)];
-      for (Corner& corner : t.corners) corner.light.x() = 0.92f * sum;
-    }
-    item.update_bounds();
-    occluders.push_back({item.centre, 0.5 * item.radius_m});
-    meshes.push_back(std::move(item));
+  struct Part {
+    std::vector<Mesh> meshes;
+    std::vector<Occluder> occluders;
+  };
+  std::vector<Part> parts(members_.size());
+  parallel_for(static_cast<int>(parts.size()), threads,
+               [&](int i, int) { arrange(members_[i], time_s, eye, light, parts[i].meshes, parts[i].occluders); });
+  for (Part& part : parts) {
+    for (Mesh& mesh : part.meshes) meshes.push_back(std::move(mesh));
+    occluders.insert(occluders.end(), part.occluders.begin(), part.occluders.end());
   }
+}
+
+void Cast::arrange(const Member& member, double time_s, const Eigen::Vector3d& eye, const LightModel& light,
+                   std::vector<Mesh>& meshes, std::vector<Occluder>& occluders) const {
+  const Placement placement = member.walks ? walker(member, time_s) : sitter(member, time_s);
+  const auto motions = solve_pose(placement.pose);
+  const double scale = member.person->scale();
+  add_occluders(placement, motions, scale, occluders);
+  const Eigen::Vector3d middle = placement.world_from_person * Eigen::Vector3d(0, 0, 1.1);
+  const std::array<float, 6> cube = light.cube(middle);
+  meshes.emplace_back();
+  meshes.back().role = static_cast<std::uint8_t>(member.role);
+  member.person->pose(motions, placement.world_from_person, cube, (middle - eye).norm() < kFineDistance_m,
+                      meshes.back());
+  if (member.item == Item::kNone) return;
+  Mesh item = member.item_shape;
+  item.role = static_cast<std::uint8_t>(member.item_role);
+  const double lift = placement.pose.pelvis.z() - rest_bones()[kPelvis].joint.z();
+  const Eigen::Vector3d bob(0, 0, member.item == Item::kSuitcase ? 0.0 : lift);
+  const double item_scale = member.item == Item::kSuitcase ? 1.0 : scale;
+  for (Eigen::Vector3d& v : item.vertices) v = placement.world_from_person * Eigen::Vector3d(item_scale * (v + bob));
+  for (Triangle& t : item.triangles) {
+    const Eigen::Vector3d &a = item.vertices[t.corners[0].vertex], &b = item.vertices[t.corners[1].vertex],
+                          &c = item.vertices[t.corners[2].vertex];
+    const Eigen::Vector3d n = (b - a).cross(c - a).normalized();
+    float sum = 0;
+    for (int axis = 0; axis < 3; ++axis) sum += static_cast<float>(n[axis] * n[axis]) * cube[2 * axis + (n[axis] < 0)];
+    for (Corner& corner : t.corners) corner.light.x() = 0.92f * sum;
+  }
+  item.update_bounds();
+  occluders.push_back({item.centre, 0.5 * item.radius_m});
+  meshes.push_back(std::move(item));
 }
 
 }  // namespace semvslam::render

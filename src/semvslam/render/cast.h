@@ -36,7 +36,7 @@ class Cast {
   /// Meshes at a time, role numbers set (1 + index into roles()), and what darkens the floor. @param eye near it the
   /// finer surfaces are used.
   void arrange(double time_s, const Eigen::Vector3d& eye, const LightModel& light, std::vector<Mesh>& meshes,
-               std::vector<Occluder>& occluders) const;
+               std::vector<Occluder>& occluders, int threads) const;
 
  private:
   enum class Item { kNone, kCarton, kSuitcase, kChair };
@@ -59,6 +59,8 @@ class Cast {
   Placement sitter(const Member& member, double time_s) const;
   double walked_m(double time_s) const;
   void build_item(Member& member, SceneBuilder& builder, std::uint64_t seed);
+  void arrange(const Member& member, double time_s, const Eigen::Vector3d& eye, const LightModel& light,
+               std::vector<Mesh>& meshes, std::vector<Occluder>& occluders) const;
   static void add_occluders(const Placement& placement, const std::array<BoneMotion, kBones>& motions, double scale,
                             std::vector<Occluder>& out);
 

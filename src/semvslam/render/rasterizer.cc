@@ -181,7 +181,7 @@ void Rasterizer::fill_band(int band, BandBuffers& buffers) const {
     buffers.triangle[s].assign(static_cast<std::size_t>(kBandRows) * camera_.width_px, kNothing);
   }
   for (const std::uint32_t id : bins_[band]) {
-    const ScreenTriangle& triangle = triangles_[id];
+    const ScreenTriangle& triangle = *triangles_[id];
     const int first = std::max(triangle.first_row, top), last = std::min(triangle.last_row, bottom - 1);
     const std::uint32_t surface = triangle.continues ? id - 1 : id;
     for (int row = first; row <= last; ++row) fill_row(triangle, surface, row, top, buffers);
@@ -241,7 +241,7 @@ void Rasterizer::resolve_band(int band, const BandBuffers& buffers, const std::v
       depth_row[x] = cosine_row[x] = 0.f;
       instance_row[x] = 0;
       if (centre != kNothing) {
-        const ScreenTriangle& t = triangles_[centre];
+        const ScreenTriangle& t = *triangles_[centre];
         const double inverse = t.inverse_depth[0] * x + t.inverse_depth[1] * y + t.inverse_depth[2];
         depth_row[x] = static_cast<float>(1.0 / inverse);
         const double ray_x = (x - camera_.cx_px) / camera_.fx_px;
@@ -254,7 +254,7 @@ void Rasterizer::resolve_band(int band, const BandBuffers& buffers, const std::v
       Colour4 sum{};
       if (ids[0] == ids[1] && ids[0] == ids[2] && ids[0] == ids[3]) {
         if (ids[0] != kNothing) {
-          sum = shade(triangles_[ids[0]], static_cast<float>(x), static_cast<float>(y), textures, light) * 4.f;
+          sum = shade(*triangles_[ids[0]], static_cast<float>(x), static_cast<float>(y), textures, light) * 4.f;
         }
       } else {
         for (int s = 0; s < 4; ++s) {
@@ -268,7 +268,7 @@ void Rasterizer::resolve_band(int band, const BandBuffers& buffers, const std::v
             count += 1.f;
             if (other > s) ids[other] = kNothing;
           }
-          sum += shade(triangles_[id], static_cast<float>(x) + mean_x / count, static_cast<float>(y) + mean_y / count,
+          sum += shade(*triangles_[id], static_cast<float>(x) + mean_x / count, static_cast<float>(y) + mean_y / count,
                        textures, light) *
                  count;
         }
@@ -287,18 +287,22 @@ void Rasterizer::draw(const std::vector<const Mesh*>& meshes, const std::vector<
   picture.cosine.create(camera_.height_px, camera_.width_px, CV_32FC1);
   picture.instances.create(camera_.height_px, camera_.width_px, CV_8UC1);
   const SE3 camera_from_world = world_from_camera.inverse();
-  std::vector<std::vector<ScreenTriangle>> parts(meshes.size());
-  parallel_for(static_cast<int>(meshes.size()), threads, [&](int i, int) {
-    if (!outside(*meshes[i], camera_from_world)) set_up(*meshes[i], camera_from_world, parts[i]);
+  if (parts_.size() < meshes.size()) parts_.resize(meshes.size());
+  const int last = static_cast<int>(meshes.size()) - 1;
+  parallel_for(last + 1, threads, [&](int task, int) {
+    const int i = last - task;  // people come last and are the most work: they go first
+    parts_[i].clear();
+    if (!outside(*meshes[i], camera_from_world)) set_up(*meshes[i], camera_from_world, parts_[i]);
   });
   triangles_.clear();
   for (auto& bin : bins_) bin.clear();
-  for (const auto& part : parts) {
-    for (const ScreenTriangle& triangle : part) {
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    for (const ScreenTriangle& triangle : parts_[i]) {
       const auto id = static_cast<std::uint32_t>(triangles_.size());
-      for (int band = triangle.first_row / kBandRows; band <= triangle.last_row / kBandRows; ++band)
+      for (int band = triangle.first_row / kBandRows; band <= triangle.last_row / kBandRows; ++band) {
         bins_[band].push_back(id);
-      triangles_.push_back(triangle);
+      }
+      triangles_.push_back(&triangle);
     }
   }
   buffers_.resize(std::max<std::size_t>(buffers_.size(), std::max(1, threads)));

@@ -77,9 +77,10 @@ class Rasterizer {
 
   Camera camera_;
   int bands_ = 0;
-  std::vector<ScreenTriangle> triangles_;
-  std::vector<std::vector<std::uint32_t>> bins_;  // per band: indices into triangles_
-  std::vector<BandBuffers> buffers_;              // per worker
+  std::vector<std::vector<ScreenTriangle>> parts_;  // per mesh
+  std::vector<const ScreenTriangle*> triangles_;    // all of them, in drawing order
+  std::vector<std::vector<std::uint32_t>> bins_;    // per band: indices into triangles_
+  std::vector<BandBuffers> buffers_;                // per worker
 };
 
 }  // namespace semvslam::render

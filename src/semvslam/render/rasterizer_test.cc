@@ -144,6 +144,35 @@ TEST(Rasterizer, TexelsComeOutWhereTheyProject) {
   EXPECT_LE(cv::norm(picture.colour, image, cv::NORM_INF), 1.0);
 }
 
+TEST(Rasterizer, AHalfTurnedCameraSeesTheHalfTurnedPicture) {
+  // Any shift between colour and geometry would show twice.
+  Camera camera = small_camera(160, 120);
+  camera.fx_px = camera.fy_px = 130;
+  camera.cx_px = 79.5;
+  camera.cy_px = 59.5;
+  RandomStream random(5);
+  cv::Mat image(256, 256, CV_8UC3);
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 256; ++x)
+      image.at<cv::Vec3b>(y, x) = cv::Vec3b::all(static_cast<std::uint8_t>(random.below(256)));
+  }
+  std::vector<Texture> textures;
+  textures.emplace_back(image, false);
+  const std::array<Eigen::Vector3d, 4> corners{
+      Eigen::Vector3d(-2, 1.3, 1.5), {1.5, 1.1, 2.5}, {1.4, -1.2, 4}, {-1.8, -1.5, 2}};
+  std::array<Eigen::Vector3d, 4> flat = corners;  // the fourth into the plane of the others
+  flat[3] = corners[0] + corners[2] - corners[1];
+  const SE3 half_turn(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero());
+  const Picture upright = draw(camera, {quad(flat)}, textures),
+                turned = draw(camera, {quad(flat)}, textures, half_turn);
+  cv::Mat back, difference;
+  cv::flip(turned.colour, back, -1);
+  cv::absdiff(upright.colour, back, difference);
+  EXPECT_GT(cv::countNonZero(upright.depth_m), 5000);
+  EXPECT_LE(cv::countNonZero(difference.reshape(1) > 1), 30) << "rounding at most";
+  EXPECT_LT(cv::mean(difference)[0], 0.02);
+}
+
 TEST(Rasterizer, NeighbouringTrianglesLeaveNoGapAndNoOverlap) {
   // A fan around an odd point: every pixel inside belongs to exactly one triangle, and a second fan behind never shows.
   const Camera camera = small_camera();

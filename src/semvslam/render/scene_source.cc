@@ -99,7 +99,7 @@ struct RenderedScene::Impl {
 
 void RenderedScene::Impl::draw(double time, Picture& out) {
   const SE3 world_from_camera = path.pose(time);
-  cast->arrange(time, world_from_camera.translation(), *light, moving, occluders);
+  cast->arrange(time, world_from_camera.translation(), *light, moving, occluders, options.threads);
   shadow->update(scene.patches, occluders);
   std::vector<const Mesh*> meshes;
   for (const Mesh& mesh : scene.meshes) meshes.push_back(&mesh);
