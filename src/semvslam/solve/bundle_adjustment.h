@@ -42,10 +42,15 @@ struct BaSummary {
 };
 
 /// Levenberg-Marquardt on poses and points with the points eliminated by the Schur complement (Triggs et al., 2000,
-/// section 6.1; Lourakis & Argyros, SBA, 2009); sparse over (pose, pose) blocks, dense Cholesky for the reduced system.
+/// section 6.1; Lourakis & Argyros, SBA, 2009). The reduced system is solved by a dense Cholesky factorisation for up
+/// to 64 free poses, beyond that by a sparse one when few pairs of poses see points together. Observations and points
+/// that are not finite are left out, as are points that one pixel without depth does not fix; poses without edges stay.
+/// Throws std::invalid_argument when indices or array sizes contradict each other.
 /// @param problem poses and points are overwritten with the result.
-/// @param edge_inlier resized to edges.size(): 1 where the pixel residual passes at the solution.
-/// Deterministic: fixed order of summation, one thread.
+/// @param edge_inlier resized to edges.size(): 1 where the pixel residual passes at the solution (where the numbers can
+/// be
+///        used at all, when the summary says that the problem is not usable).
+/// Deterministic: fixed order of summation, whatever the order of the edges; one thread.
 BaSummary adjust_bundle(BaProblem& problem, const BaOptions& options, std::vector<std::uint8_t>& edge_inlier,
                         std::stop_token stop = {});
 
