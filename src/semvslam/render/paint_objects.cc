@@ -314,11 +314,13 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
       }
     }
   }
-  for (int i = 0; i < 900; ++i) {  // foliage
-    const int r = 2 + random.below(w / 50);
+  for (int i = 0; i < 2600; ++i) {  // foliage: dark leaves first, lit ones over them
+    const int r = 2 + random.below(w / 110);
+    const double lit = static_cast<double>(i) / 2600;
     const double x = random.uniform() * w, crown = 0.62 + 0.18 * std::sin(x * 0.02) + 0.1 * std::sin(x * 0.053);
     cv::circle(image, {static_cast<int>(x), static_cast<int>(h * random.uniform(crown, 1.05))}, r,
-               scalar(hue_colour(random.uniform(0.2, 0.36), random.uniform(0.35, 0.7), random.uniform(0.25, 0.7))),
+               scalar(hue_colour(random.uniform(0.2, 0.34), random.uniform(0.35, 0.65),
+                                 random.uniform(0.15, 0.35) + 0.35 * lit)),
                cv::FILLED, cv::LINE_AA);
   }
   return image;
