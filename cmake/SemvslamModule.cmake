@@ -24,6 +24,7 @@ function(semvslam_module name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   # One alignment for our objects, for Ceres as packaged and for foreign consumers, whatever -march each was built with.
   target_compile_definitions(semvslam_${name} PUBLIC EIGEN_MAX_ALIGN_BYTES=16)
+  target_compile_features(semvslam_${name} PUBLIC cxx_std_20)  # for users of the installed package too
   target_link_libraries(semvslam_${name} PUBLIC ${M_LINKS} PRIVATE ${M_PRIVATE_LINKS} $<BUILD_INTERFACE:semvslam_build_flags>)
   set_property(GLOBAL APPEND PROPERTY SEMVSLAM_MODULES semvslam_${name})
   if(SEMVSLAM_TESTS AND M_TESTS)

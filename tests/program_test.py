@@ -218,7 +218,7 @@ class ProgramTest(unittest.TestCase):
         far = "".join(f"{1000 + i} {i} {i * i} 0 0 0 0 1\n" for i in range(5))
         self.expect_error(call("eval", truth, file("far.txt", far)), 3, "no pose of the estimate")
         self.expect_error(call("eval", truth, truth, "--delta", "1h"), 3, "delta")
-        self.expect_error(call("eval", truth, truth, "--plot", self.folder / "no" / "x.svg"), 4)
+        self.expect_error(call("eval", truth, truth, "--plot", self.folder / "no" / "x.svg"), 3, "x.svg")
         unsorted = file("unsorted.txt", "\n".join([lines[0]] + lines[:0:-1]) + "\n")
         done = call("eval", truth, unsorted, "--json", "-")
         self.assertLess(json.loads(done.stdout)["estimate"]["ate_m"]["max"], 1e-6)
