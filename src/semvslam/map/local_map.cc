@@ -48,6 +48,7 @@ std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, 
 std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId reference, const LocalMapOptions& options) {
   auto local = std::make_shared<LocalMap>();
   local->reference = reference;
+  local->reference_frame = map.key_frame(reference)->frame;
   std::vector<KeyFrameId> window{reference};
   for (const Covisible& c : map.covisible(reference, 1)) {
     if (window.size() > static_cast<std::size_t>(options.covisible_key_frames)) break;

@@ -26,6 +26,7 @@ struct LocalMap {
   };
 
   KeyFrameId reference;                                  // the key frame it was made around
+  FrameId reference_frame;                               // the frame that the reference was
   int reference_matches = 0;                             // landmarks that the reference sees
   std::vector<Point> points;                             // ascending by id
   std::vector<KeyFramePose> key_frames;                  // ascending by id, the reference included

@@ -17,8 +17,8 @@ struct MappingOptions {
   int young_key_frames = 3;           // a landmark must have three observations after so many key frames
   int fuse_key_frames = 12;           // neighbours in which the new key frame's landmarks are searched, and vice versa
   double fuse_radius_px = 3;          // at level 0
-  int bundle_key_frames = 20;         // optimised in a local bundle adjustment
-  int bundle_fixed_key_frames = 40;   // that hold it in place
+  int bundle_key_frames = 15;         // optimised in a local bundle adjustment
+  int bundle_fixed_key_frames = 30;   // that hold it in place
   int final_bundles = 2;         // full bundle adjustments when the run ends; the second without the first's outliers
   int min_shared = 15;           // landmarks that make two key frames neighbours
   double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others

@@ -265,6 +265,10 @@ void Tracker::count_uses(const std::vector<LandmarkId>& visible, const std::vect
 bool Tracker::wants_key_frame(int inliers, FrameId frame) const {
   const int since = static_cast<int>(frame.value - last_key_frame_.value);
   if (since < options_.min_frames_between) return false;
+  // While mapping still works on the last request the snapshot cannot know what that one will bring: only a view that
+  // is about to get lost is worth another.
+  const bool pending = local_->reference_frame < last_key_frame_;
+  if (pending) return inliers < 0.5 * options_.key_frame_ratio * local_->reference_matches;
   int tracked_close = 0, new_close = 0;
   for (std::size_t i = 0; i < current_.features->size(); ++i) {
     const float depth = current_.features->depth_m[i];

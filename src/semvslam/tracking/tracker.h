@@ -21,7 +21,7 @@ struct TrackingOptions {
   double local_map_radius_px = 4;  // search window of local-map matching, at level 0
   int max_distance_bits = 80;      // descriptors farther apart never match
   double min_view_cosine = 0.5;    // a landmark seen from a direction farther off is not searched
-  double key_frame_ratio = 0.6;    // new key frame when fewer than this share of the reference's landmarks is tracked
+  double key_frame_ratio = 0.7;    // new key frame when fewer than this share of the reference's landmarks is tracked
   int min_tracked_close = 100;     // ... or fewer close landmarks than this are tracked while more than
   int min_new_close = 70;          // this many close features have none
   double close_depth_m = 3.5;
