@@ -6,7 +6,8 @@
 
 namespace semvslam {
 
-/// A point in time, nanoseconds since an epoch that the recording chose. An integer: 1305031102.175304 s has no exact double.
+/// A point in time, nanoseconds since an epoch that the recording chose. An integer: 1305031102.175304 s has no exact
+/// double.
 struct TimeStamp {
   std::int64_t ns = 0;
 
