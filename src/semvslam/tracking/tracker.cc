@@ -17,7 +17,7 @@ bool inside(const Camera& camera, const Eigen::Vector2d& pixel) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width_px && pixel.y() < camera.height_px;
 }
 
-constexpr double kNearestProjection_m = 0.05;
+constexpr double kNearestProjection = 0.05;  // metres before the camera
 
 }  // namespace
 
@@ -131,7 +131,7 @@ bool Tracker::track_motion(const SE3& predicted, double radius_factor) {
     else
       continue;
     const Eigen::Vector3d in_camera = predicted * in_world;
-    if (in_camera.z() < kNearestProjection_m) continue;
+    if (in_camera.z() < kNearestProjection) continue;
     const Eigen::Vector2d pixel = camera.project(in_camera);
     if (!inside(camera, pixel)) continue;
     const Keypoint& keypoint = last.orb.keypoints[i];
@@ -215,7 +215,7 @@ int Tracker::track_local_map() {
   for (std::size_t k = 0; k < local_->points.size(); ++k) {
     const LocalMap::Point& point = local_->points[k];
     const Eigen::Vector3d in_camera = pose * point.position;
-    if (in_camera.z() < kNearestProjection_m) continue;
+    if (in_camera.z() < kNearestProjection) continue;
     const Eigen::Vector2d pixel = camera.project(in_camera);
     if (!inside(camera, pixel)) continue;
     const Eigen::Vector3d ray = point.position - centre;
