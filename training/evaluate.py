@@ -128,8 +128,10 @@ def score_sequence(seg, folder, threshold, step):
     recall, precision, clear, false = [], [], 0, 0
     for path in sorted(glob.glob(os.path.join(folder, "rgb", "*")))[::step]:
         stem = os.path.splitext(os.path.basename(path))[0]
-        truth = np.isin(cv2.imread(os.path.join(folder, "mask", stem + ".png"), cv2.IMREAD_UNCHANGED), ids)
         bgr = cv2.imread(path)
+        truth = np.zeros(bgr.shape[:2], bool)
+        if ids:                                            # a sequence without roles has no masks
+            truth = np.isin(cv2.imread(os.path.join(folder, "mask", stem + ".png"), cv2.IMREAD_UNCHANGED), ids)
         pred = np.zeros(truth.shape, bool)
         for i in seg(bgr, threshold):
             if i["class"] == 0:
