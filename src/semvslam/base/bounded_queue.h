@@ -7,8 +7,9 @@
 
 namespace semvslam {
 
-/// First in, first out, at most `capacity` elements. push() BLOCKS while full; try_push() refuses. The end of a stream is a
-/// closed queue: after close() pushes are refused and pops drain what is left, then return nothing. Any number of threads.
+/// First in, first out, at most `capacity` elements. push() BLOCKS while full; try_push() refuses. The end of a stream
+/// is a closed queue: after close() pushes are refused and pops drain what is left, then return nothing. Any number of
+/// threads.
 template <typename T>
 class BoundedQueue {
  public:

@@ -6,7 +6,8 @@
 
 namespace semvslam {
 
-/// An id that is a type of its own, so that a landmark's id cannot index key frames. Explicit to build; ordered; hashable.
+/// An id that is a type of its own, so that a landmark's id cannot index key frames. Explicit to build; ordered;
+/// hashable.
 template <typename Tag>
 struct Id {
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -18,7 +19,7 @@ struct Id {
   friend constexpr auto operator<=>(Id, Id) = default;
 };
 
-using FrameId = Id<struct FrameTag>;        // position in the input stream, from 0
+using FrameId = Id<struct FrameTag>;  // position in the input stream, from 0
 using KeyFrameId = Id<struct KeyFrameTag>;
 using LandmarkId = Id<struct LandmarkTag>;
 using InstanceId = Id<struct InstanceTag>;  // one segmented object of one image
