@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "semvslam/geometry/alignment.h"
 #include "semvslam/tracking/plane_world_testing.h"
 
 namespace semvslam {
@@ -19,13 +20,19 @@ std::unique_ptr<Slam> make_slam(const PlaneWorld& world, bool deterministic) {
   return std::move(slam).value();
 }
 
-void expect_truth(const Trajectory& trajectory, double tolerance_m) {
+/// The absolute trajectory error after rigid alignment stays below one percent of the way.
+void expect_truth(const Trajectory& trajectory) {
+  std::vector<Eigen::Vector3d> truth, estimate;
+  double way_m = 0;
   for (const StampedPose& pose : trajectory) {
     const auto frame = static_cast<int>(std::lround(pose.stamp.seconds() * 30));
-    EXPECT_LT((PlaneWorld::world_from_camera(frame).inverse() * pose.world_from_camera).translation().norm(),
-              tolerance_m)
-        << "frame " << frame;
+    truth.push_back(PlaneWorld::world_from_camera(frame).translation());
+    estimate.push_back(pose.world_from_camera.translation());
+    if (truth.size() > 1) way_m += (truth[truth.size() - 1] - truth[truth.size() - 2]).norm();
   }
+  const Result<Alignment> alignment = align_points(truth, estimate, false);
+  ASSERT_TRUE(alignment.ok());
+  EXPECT_LT(alignment->rmse_m, 0.01 * way_m);
 }
 
 constexpr int kFrames = 40;
@@ -47,9 +54,7 @@ TEST_P(SlamTest, EveryFrameIsTrackedAndTheMapIsConsistent) {
   const Status invariants = slam->check_invariants();
   EXPECT_TRUE(invariants.ok()) << invariants.error().message;
   ASSERT_EQ(slam->trajectory().size(), static_cast<std::size_t>(kFrames));
-  // Poses are compared unaligned, 0.4 m into unknown terrain: one percent of the way. (A third of a pixel is 2 mm
-  // here.)
-  expect_truth(slam->trajectory(), 0.004);
+  expect_truth(slam->trajectory());
   const SlamStatistics statistics = slam->statistics();
   EXPECT_EQ(statistics.frames, static_cast<std::uint64_t>(kFrames));
   EXPECT_EQ(statistics.tracked, static_cast<std::uint64_t>(kFrames));
@@ -88,7 +93,7 @@ TEST_P(SlamTest, DarkFramesAreCountedLostAndTrackingComesBack) {
   ASSERT_TRUE(slam->finish().ok());
   EXPECT_EQ(slam->statistics().lost, 3u);
   EXPECT_EQ(slam->trajectory().size(), 17u);
-  expect_truth(slam->trajectory(), 0.004);
+  expect_truth(slam->trajectory());
 }
 
 TEST_P(SlamTest, QueriesFromAnotherThreadSeeConsistentStates) {
