@@ -49,13 +49,13 @@ class PlaneWorld {
     out.stamp = TimeStamp{frame * 33'333'333LL};
     out.gray.create(camera_.height_px, camera_.width_px, CV_8UC1);
     out.depth.create(camera_.height_px, camera_.width_px, CV_32FC1);
-    const Eigen::Vector3d normal = Eigen::Vector3d(0.15, 0.1, 1).normalized();  // n . x = kDistance_m
+    const Eigen::Vector3d normal = Eigen::Vector3d(0.15, 0.1, 1).normalized();  // n . x = kWallDistance
     const Eigen::Matrix3d rotation = world_from_camera.rotation_matrix();
     const Eigen::Vector3d centre = world_from_camera.translation();
     for (int y = 0; y < camera_.height_px; ++y)
       for (int x = 0; x < camera_.width_px; ++x) {
         const Eigen::Vector3d ray = camera_.back_project({static_cast<double>(x), static_cast<double>(y)}, 1.0);
-        const double depth = (kDistance_m - normal.dot(centre)) / normal.dot(rotation * ray);
+        const double depth = (kWallDistance - normal.dot(centre)) / normal.dot(rotation * ray);
         const Eigen::Vector3d p = rotation * (ray * depth) + centre;
         out.depth.at<float>(y, x) = static_cast<float>(depth);
         out.gray.at<std::uint8_t>(y, x) =
@@ -66,7 +66,7 @@ class PlaneWorld {
 
  private:
   static constexpr int kTexturePixels = 1024;
-  static constexpr double kPixelsPerMetre = 170, kDistance_m = 1.6;
+  static constexpr double kPixelsPerMetre = 170, kWallDistance = 1.6;
 
   std::uint8_t sample(double u, double v) const {
     const int x = std::clamp(static_cast<int>(std::floor(u)), 0, kTexturePixels - 2);
