@@ -95,7 +95,6 @@ run_full() {
 
 run_tests() {
   local full=false filter=()
-  if [ "${CI:-}" = true ]; then full=true; fi
   while [ $# -gt 0 ]; do
     case $1 in
       --full) full=true ;;
