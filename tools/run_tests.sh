@@ -1,7 +1,7 @@
 # Sourced by ./semvslam. Runs all tests and ends with one line "N passed, N failed, N skipped"; the exit code is 0 only when
 # nothing failed.
 #   run_tests [--filter REGEX] [--full]
-# --filter: only the tests whose name matches. --full (and CI=true): also clang-tidy, the sanitizers and the fuzz targets.
+# --filter: only the tests whose name matches. --full: also clang-tidy, the sanitizers and the fuzz targets.
 
 passed=0 failed=0 skipped=0
 failures=()
