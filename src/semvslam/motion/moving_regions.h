@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "semvslam/motion/motion_check.h"
+
+namespace semvslam {
+
+using RegionId = Id<struct RegionTag>;
+
+enum class RegionState : std::uint8_t {
+  kMoving,
+  kPaused,  // moved a moment ago; its points are not trusted yet
+};
+std::string_view to_string(RegionState state);
+
+/// A thing that moves and belongs to no known instance.
+struct MovingRegion {
+  RegionId id;
+  RegionState state = RegionState::kMoving;
+  cv::Rect window;        // where `mask` lies in the image; inside it
+  cv::Mat mask;           // CV_8UC1 of the window's size, 255 = the thing
+  int tracks = 0;         // moving tracks in it now
+  int seeds = 0;          // places where the surface is nearer than it should be
+  float depth_m = 0;      // median
+  double moved_at_s = 0;  // when it was last seen to move
+  Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();
+};
+
+struct MovingRegionOptions {
+  int min_tracks = 3;       // moving tracks (and depth seeds) that make a new region
+  double cluster_px = 60;   // tracks farther apart in the image ...
+  double cluster_m = 0.35;  // ... or in space are in different regions
+  double margin_px = 25;    // a region may reach that far beyond its tracks
+  double hold_s = 1.0;      // it is kept for that long after it stopped
+  bool depth_seeds = true;  // use surfaces nearer than predicted as further evidence
+  int seed_step_px = 8;     // raster on which they are looked for
+
+  void add_to(ConfigSchema& schema);
+};
+
+/// Groups moving tracks into things, gives them a mask by growing over the depth image, and follows them over time.
+class MovingRegions {
+ public:
+  MovingRegions(const Camera& camera, const MovingRegionOptions& options, const MotionCheckOptions& check_options);
+
+  /// @param motion of this frame, as the tracks. Tracks inside frame.excluded or frame.instances make no regions.
+  void step(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion);
+
+  const std::vector<MovingRegion>& regions() const { return regions_; }
+  /// CV_8UC1 of the image's size: 255 = inside a region, moving or paused. All zero where there is none.
+  const cv::Mat& mask() const { return mask_; }
+  void reset();
+
+ private:
+  Camera camera_;
+  MovingRegionOptions options_;
+  MotionCheckOptions check_options_;
+  std::uint32_t next_id_ = 0;
+  std::vector<MovingRegion> regions_;
+  cv::Mat mask_;
+};
+
+/// How the tracks inside one instance fare.
+struct InstanceMotion {
+  InstanceId instance;
+  int moving = 0, at_rest = 0, unknown = 0;
+  /// Share of moving ones among those with a verdict; 0 without any.
+  double moving_share() const { return moving + at_rest > 0 ? static_cast<double>(moving) / (moving + at_rest) : 0; }
+};
+
+/// @param instances CV_16UC1 of the frame's size, 0 = none, n = instance n - 1. Entry i is instance i; as many as
+/// asked.
+std::vector<InstanceMotion> count_instance_motion(std::span<const FlowTrack> tracks,
+                                                  std::span<const TrackMotion> motion, const cv::Mat& instances,
+                                                  std::size_t count);
+
+}  // namespace semvslam
