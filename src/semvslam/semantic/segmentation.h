@@ -10,6 +10,15 @@
 
 namespace semvslam {
 
+/// Where the pixels of an Instance come from.
+enum class Provenance {
+  kSegmented,  // as the segmenter gave it
+  kExtended,   // segmented, with a lost part put back
+  kRestored,   // the segmenter missed it: carried over from an earlier frame
+};
+
+using TrackId = Id<struct TrackTag>;  // one object over many images
+
 /// One object of one image.
 struct Instance {
   InstanceId id;        // position in its Segmentation
@@ -20,6 +29,8 @@ struct Instance {
   cv::Rect2f box;     // px
   cv::Rect window;    // where `mask` lies in the image; inside it
   cv::Mat mask;       // CV_8UC1 of the window's size, 255 = the object. Shared, never written to after construction
+  Provenance provenance = Provenance::kSegmented;
+  TrackId track;  // set by SegmentationRepair, none before
 };
 
 /// What is to be seen in one image. Late data: it names the frame that it was made from.

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "semvslam/base/config_schema.h"
+#include "semvslam/geometry/se3.h"
+#include "semvslam/semantic/mask_carry.h"
+#include "semvslam/semantic/segmentation.h"
+
+namespace semvslam {
+
+struct InstanceMemoryOptions {
+  double least_overlap = 0.2;  // IoU of a tracked and a segmented instance of one class that are the same object
+  int confirmations = 2;       // frames in which an object was segmented before it may be restored
+  int longest_carry = 15;      // frames in a row that an object is carried without being segmented
+  double least_support = 0.4;  // share of its carried pixels that must fit the present depth
+  int least_px = 200;          // smaller remains are dropped
+  double limb_trigger = 0.04;  // loss of area, as a share, at which lost parts are looked for
+
+  void add_to(ConfigSchema& schema);
+};
+
+/// What InstanceMemory did to one frame.
+struct MemoryReport {
+  int restored_instances = 0, extended_instances = 0, restored_px = 0;
+};
+
+/// Follows every dynamic instance over the frames: by overlap, class and depth. One that vanishes in mid-image is
+/// restored, one that leaves through the border or goes behind something nearer is not; parts that vanish while their
+/// depth stays are put back.
+class InstanceMemory {
+ public:
+  InstanceMemory(const Camera& camera, const MaskCarryOptions& carry, const InstanceMemoryOptions& options);
+
+  /// Updates the memory and repairs `segmentation` (of the frame `present`) in place.
+  /// @param lacking whether the segmentation as a whole is known to lack something: then every instance is looked at.
+  MemoryReport step(const CarryFrame& present, const std::optional<SE3>& cur_from_prev, bool lacking,
+                    Segmentation& segmentation);
+  void reset();
+
+ private:
+  struct Track {
+    TrackId id;
+    Instance last;         // in the frame before
+    float depth_m = 0;     // median; 0 = unknown
+    cv::Point2f shift_px;  // motion per frame
+    int confirmed = 0;     // frames in which it was segmented
+    int carried = 0;       // frames since
+    int extended = 0;      // frames in a row with a part put back
+  };
+  MaskCarry carry_;
+  InstanceMemoryOptions options_;
+  CarryFrame previous_;
+  std::vector<Track> tracks_;
+  std::uint32_t next_track_ = 0;
+};
+
+}  // namespace semvslam
