@@ -9,6 +9,8 @@ std::span<const Command> commands() {
       Command{"demo", "the main job on a rendered room with people in it", setup_demo},
       Command{"run", "the main job: trajectory, key frames, map and statistics of a recording", setup_run},
       Command{"eval", "measure a trajectory against the ground truth: ATE, RPE, improvement, plot", setup_eval},
+      Command{"segment", "find people and things in pictures: overlay, instance image, JSON", setup_segment},
+      Command{"eval-seg", "score the segmentation against labelled pictures", setup_eval_seg},
       Command{"render", "write a rendered recording with exact ground truth and masks", setup_render},
       Command{"config", "show every configuration value with its meaning", setup_config},
       Command{"version", "print the version", setup_version},

@@ -93,7 +93,7 @@ CommandHandler setup_eval_seg(CLI::App& parser) {
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
   parser.add_option("--json", a->json, "write all numbers to this file (- = standard output, alone)");
-  parser.add_option("--model", a->options.model, "folder with model.json")->capture_default_str();
+  parser.add_option("--model", a->options.model, "folder with model.json (default: the network that comes along)");
   parser.add_option("--threads", a->options.threads, "threads of the network")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include "semvslam/semantic/default_model.h"
 #include "semvslam/semantic/folder_segmenter.h"
 #include "semvslam/semantic/network_segmenter.h"
 
@@ -23,12 +24,15 @@ class NoSegmenter final : public Segmenter {
 
 Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options, const RoleTable& roles,
                                                 StageTimers* timers) {
-  Result<ModelDescription> model = ModelDescription::read(options.model);
+  const Result<std::filesystem::path> folder =
+      options.model.empty() ? default_model_folder() : Result<std::filesystem::path>(options.model);
+  if (!folder) return folder.error();
+  Result<ModelDescription> model = ModelDescription::read(*folder);
   if (!model) return model.error();
   const bool openvino = options.backend == "openvino" || (options.backend == "auto" && have_openvino());
   Result<std::unique_ptr<NetworkGraphs>> graphs =
-      openvino ? make_openvino_graphs(options.model, *model, options.precision, options.threads)
-               : make_opencv_graphs(options.model, *model);
+      openvino ? make_openvino_graphs(*folder, *model, options.precision, options.threads)
+               : make_opencv_graphs(*folder, *model);
   if (!graphs) return graphs.error();
   NetworkSegmenter::Limits limits;
   limits.score = static_cast<float>(options.score);
@@ -40,7 +44,7 @@ Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options,
 
 void SegmenterOptions::add_to(ConfigSchema& schema) {
   schema.add("segment.source", &source, {"network", "folder", "none"}, "where masks come from");
-  schema.add("segment.model", &model, {}, "folder with the network's model.json");
+  schema.add("segment.model", &model, {}, "folder with the network's model.json; empty = the one that comes with it");
   schema.add("segment.backend", &backend, {"auto", "openvino", "opencv"}, "library that runs the network");
   schema.add("segment.precision", &precision, {"auto", "f32"},
              "auto = fastest type of this machine, f32 = alike everywhere");

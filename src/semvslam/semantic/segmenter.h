@@ -40,7 +40,7 @@ class Segmenter {
 
 struct SegmenterOptions {
   std::string source = "network";  // network, folder, none
-  std::string model = "models";    // folder of the network's model.json
+  std::string model;               // folder of the network's model.json; empty: the one that comes with semvslam
   std::string backend = "auto";    // auto, openvino, opencv
   std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere
   std::string mask_folder;         // of source `folder`
