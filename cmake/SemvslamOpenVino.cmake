@@ -24,8 +24,8 @@ if(NOT OpenVINO_FOUND)
 endif()
 
 # OpenVINO's own target would put its folder among CMake's run-time paths, and CMake would warn, rightly in general, that a
-# libtbb.so.12 lies there as well as in the system. Either serves both OpenCV and OpenVINO. So the path is given to the linker
-# directly.
+# libtbb.so.12 lies there as well as in the system. Either serves both OpenCV and OpenVINO. So only the library's
+# name is linked, and the path is CMake's to keep for what is built and to drop from what is installed.
 get_target_property(library openvino::runtime IMPORTED_LOCATION_RELEASE)
 get_filename_component(SEMVSLAM_OPENVINO_FOLDER ${library} DIRECTORY)
 get_filename_component(SEMVSLAM_OPENVINO_LIBRARY ${library} NAME)
@@ -34,8 +34,8 @@ add_library(semvslam_openvino INTERFACE)
 target_include_directories(semvslam_openvino SYSTEM INTERFACE
   $<TARGET_PROPERTY:openvino::runtime,INTERFACE_INCLUDE_DIRECTORIES>)
 target_link_libraries(semvslam_openvino INTERFACE -l:${SEMVSLAM_OPENVINO_LIBRARY})
-target_link_options(semvslam_openvino INTERFACE -L${SEMVSLAM_OPENVINO_FOLDER}
-  LINKER:-rpath,${SEMVSLAM_OPENVINO_FOLDER})
+target_link_options(semvslam_openvino INTERFACE -L${SEMVSLAM_OPENVINO_FOLDER})
+list(APPEND CMAKE_BUILD_RPATH ${SEMVSLAM_OPENVINO_FOLDER})
 
 # The installed program brings the part of OpenVINO along that it uses.
 set(SEMVSLAM_INSTALL_RPATH $ORIGIN/../${SEMVSLAM_OPENVINO_INSTALLED})
