@@ -1,9 +1,11 @@
-// Uses an installed semvslam the way a foreign program would: frames in, poses out, and the evaluation library.
+// Uses an installed semvslam the way a foreign program would: frames in, poses out, the evaluation library,
+// the segmentation network that comes along.
 #include <cstdio>
 #include <opencv2/core.hpp>
 
 #include "semvslam/eval/statistics.h"
 #include "semvslam/pipeline/slam.h"
+#include "semvslam/semantic/segmenter.h"
 
 int main() {
   semvslam::Camera camera;
@@ -24,6 +26,10 @@ int main() {
     const auto result = (*slam)->process(frame);
     if (!result) return std::fprintf(stderr, "%s\n", result.error().message.c_str()), 1;
   }
+  auto segmenter = semvslam::make_segmenter({}, semvslam::RoleTable());
+  if (!segmenter) return std::fprintf(stderr, "%s\n", segmenter.error().message.c_str()), 1;
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(90));
+  if (!(*segmenter)->segment({semvslam::FrameId(0), {}, picture, ""})) return 1;
   const double errors[] = {3, 4};
   return (*slam)->finish().ok() && semvslam::error_statistics(errors).max == 4 ? 0 : 1;
 }
