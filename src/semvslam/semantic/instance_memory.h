@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "semvslam/base/config_schema.h"
@@ -16,9 +16,9 @@ struct InstanceMemoryOptions {
   double least_overlap = 0.2;  // IoU of a tracked and a segmented instance of one class that are the same object
   int confirmations = 2;       // frames in which an object was segmented before it may be restored
   int longest_carry = 15;      // frames in a row that an object is carried without being segmented
-  double least_support = 0.4;  // share of its carried pixels that must fit the present depth
   int least_px = 200;          // smaller remains are dropped
   double limb_trigger = 0.04;  // loss of area, as a share, at which lost parts are looked for
+  double least_limb = 0.02;    // smallest lost part, as a share of the object's area
 
   void add_to(ConfigSchema& schema);
 };
@@ -35,7 +35,7 @@ class InstanceMemory {
  public:
   InstanceMemory(const Camera& camera, const MaskCarryOptions& carry, const InstanceMemoryOptions& options);
 
-  /// Updates the memory and repairs `segmentation` (of the frame `present`) in place.
+  /// Updates the memory and repairs `segmentation` (of the frame `present`, its size the camera's) in place.
   /// @param lacking whether the segmentation as a whole is known to lack something: then every instance is looked at.
   MemoryReport step(const CarryFrame& present, const std::optional<SE3>& cur_from_prev, bool lacking,
                     Segmentation& segmentation);
@@ -45,12 +45,18 @@ class InstanceMemory {
   struct Track {
     TrackId id;
     Instance last;         // in the frame before
-    float depth_m = 0;     // median; 0 = unknown
-    cv::Point2f shift_px;  // motion per frame
+    int pixels = 0;        // of it
+    cv::Point2f shift_px;  // motion per frame; zero = unknown
     int confirmed = 0;     // frames in which it was segmented
-    int carried = 0;       // frames since
+    int carried = 0;       // frames in a row without
     int extended = 0;      // frames in a row with a part put back
   };
+  struct Step;  // what belongs to one call of step()
+  void match(Step& step);
+  void follow(Step& step, Track& track, Instance& now);
+  bool extend(Step& step, Track& track, Instance& now);
+  bool restore(Step& step, Track& track);
+
   MaskCarry carry_;
   InstanceMemoryOptions options_;
   CarryFrame previous_;

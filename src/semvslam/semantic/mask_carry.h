@@ -17,6 +17,8 @@ struct MaskCarryOptions {
   int points = 80;                 // LK points per instance
   double depth_tolerance_m = 0.2;  // how far a pixel's depth may be from the one carried to it
   int grow_px = 8;                 // how far connected pixels of fitting depth are taken in
+  double least_support = 0.4;      // share of the carried pixels that must fit the present depth, else it is not there
+  double least_inside = 0.15;      // share of the carried pixels that must lie in the image, else it has left
 
   void add_to(ConfigSchema& schema);
 };
@@ -24,11 +26,14 @@ struct MaskCarryOptions {
 /// The images of one moment, with what is computed from them once and on demand. Cheap to copy: the images are shared.
 class CarryFrame {
  public:
+  static constexpr int kFlowWindowPx = 15, kFlowLevels = 3;  // of LK, in the half-size image
+
   CarryFrame() = default;
   /// @param gray CV_8UC1 or empty. @param depth CV_16UC1 or CV_32FC1 (see RgbdFrame) or empty.
   CarryFrame(const Camera& camera, cv::Mat gray, cv::Mat depth);
 
   const cv::Mat& gray() const { return gray_; }
+  cv::Size half_size() const { return {(size_.width + 1) / 2, (size_.height + 1) / 2}; }
   /// CV_32FC1, m, half the width and height (every second pixel); 0 = none. Empty where there is no depth.
   const cv::Mat& half_depth_m() const;
   /// LK pyramid of the half-size image; empty where there is no gray image.
@@ -37,6 +42,7 @@ class CarryFrame {
  private:
   struct Cache;
   cv::Mat gray_, depth_;
+  cv::Size size_;
   float metres_per_unit_ = 0;
   std::shared_ptr<Cache> cache_;
 };

@@ -58,6 +58,8 @@ class MissingSegmentationDetector {
   /// Frames must come in order, gaps are allowed; a frame that is not later than the one before it starts a new history
   /// (the reference stays).
   SegmentationQuality step(FrameId frame, int person_px);
+  /// For a frame whose segmentation never came: a serious lack that is known without counting. Changes nothing.
+  SegmentationQuality missing() const;
   /// Forgets everything.
   void reset();
   double reference_px() const { return reference_px_; }

@@ -1,0 +1,258 @@
+#include "semvslam/semantic/instance_memory.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+namespace semvslam {
+namespace {
+
+constexpr int kGrid = 4;         // px: overlaps are counted on every 4th pixel of every 4th row
+constexpr double kMerged = 0.5;  // share of a carried mask that others cover when it is no object of its own
+constexpr int kGapPx = 5;        // two outlines of one object differ by up to this
+
+/// Pixels on the grid of masks, one of them moved, and in both.
+struct Overlap {
+  int first = 0, second = 0, both = 0;
+  double iou() const {
+    const int either = first + second - both;
+    return either > 0 ? static_cast<double>(both) / either : 0;
+  }
+};
+
+int count_on_grid(const cv::Rect& window, const cv::Mat& mask) {
+  int n = 0;
+  for (int y = (window.y + kGrid - 1) / kGrid * kGrid; y < window.y + window.height; y += kGrid)
+    for (int x = (window.x + kGrid - 1) / kGrid * kGrid; x < window.x + window.width; x += kGrid)
+      n += mask.at<std::uint8_t>(y - window.y, x - window.x) != 0;
+  return n;
+}
+
+Overlap overlap(const cv::Rect& window_a, const cv::Mat& a, cv::Point shift_a, const cv::Rect& window_b,
+                const cv::Mat& b) {
+  // The shift is made a multiple of the grid so that both are counted on the same pixels.
+  const cv::Point shift(shift_a.x / kGrid * kGrid, shift_a.y / kGrid * kGrid);
+  Overlap out;
+  const cv::Rect moved = window_a + shift, common = moved & window_b;
+  if (common.empty()) return out;
+  out.first = count_on_grid(window_a, a);
+  out.second = count_on_grid(window_b, b);
+  for (int y = (common.y + kGrid - 1) / kGrid * kGrid; y < common.y + common.height; y += kGrid)
+    for (int x = (common.x + kGrid - 1) / kGrid * kGrid; x < common.x + common.width; x += kGrid)
+      out.both +=
+          a.at<std::uint8_t>(y - moved.y, x - moved.x) != 0 && b.at<std::uint8_t>(y - window_b.y, x - window_b.x) != 0;
+  return out;
+}
+
+cv::Point2f centre(const Instance& i) {
+  const cv::Moments m = cv::moments(i.mask, true);
+  if (m.m00 <= 0) return cv::Point2f(i.window.tl());
+  return cv::Point2f(static_cast<float>(m.m10 / m.m00), static_cast<float>(m.m01 / m.m00)) + cv::Point2f(i.window.tl());
+}
+
+bool at_border(const cv::Rect& window, cv::Size image) {
+  return window.x <= 1 || window.y <= 1 || window.x + window.width >= image.width - 1 ||
+         window.y + window.height >= image.height - 1;
+}
+
+void place(const cv::Rect& window, const cv::Mat& mask, Instance& out) {
+  out.window = window;
+  out.mask = mask;
+  out.box = cv::Rect2f(window);
+}
+
+/// Takes from a mask what lies in another or next to it. @return pixels left
+int subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int margin_px) {
+  const cv::Rect room(-margin_px, -margin_px, 2 * margin_px, 2 * margin_px);
+  const cv::Rect common = window & cv::Rect(other.window.tl() + room.tl(), other.window.size() + room.size());
+  if (common.empty()) return cv::countNonZero(mask);
+  cv::Mat covered = cv::Mat::zeros(window.size(), CV_8UC1);
+  if (const cv::Rect both = window & other.window; !both.empty())
+    other.mask(both - other.window.tl()).copyTo(covered(both - window.tl()));
+  if (margin_px > 0)
+    cv::dilate(covered, covered,
+               cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * margin_px + 1, 2 * margin_px + 1)));
+  mask.setTo(0, covered);
+  return cv::countNonZero(mask);
+}
+
+/// Keeps the connected parts that are large enough. @return pixels left
+int keep_large(cv::Mat& mask, int least_px) {
+  cv::Mat labels, stats, centroids;
+  const int n = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 8, CV_32S);
+  std::vector<std::uint8_t> keep(static_cast<std::size_t>(n), 0);
+  int left = 0;
+  for (int i = 1; i < n; ++i)
+    if (const int area = stats.at<int>(i, cv::CC_STAT_AREA); area >= least_px) {
+      keep[static_cast<std::size_t>(i)] = 255;
+      left += area;
+    }
+  for (int y = 0; y < mask.rows; ++y) {
+    const int* label = labels.ptr<int>(y);
+    std::uint8_t* row = mask.ptr<std::uint8_t>(y);
+    for (int x = 0; x < mask.cols; ++x) row[x] = keep[static_cast<std::size_t>(label[x])];
+  }
+  return left;
+}
+
+}  // namespace
+
+void InstanceMemoryOptions::add_to(ConfigSchema& schema) {
+  schema.add("repair.least_overlap", &least_overlap, {0.01, 1.0},
+             "IoU of two masks of one object in successive frames");
+  schema.add("repair.confirmations", &confirmations, {1, 1000},
+             "frames in which an object was seen before it is restored");
+  schema.add("repair.longest_carry", &longest_carry, {0, 10000}, "frames in a row that an object is restored");
+  schema.add("repair.least_px", &least_px, {1, 1000000}, "smallest restored object, px");
+  schema.add("repair.limb_trigger", &limb_trigger, {0.0, 1.0},
+             "loss of an object's area from frame to frame at which lost parts are looked for");
+  schema.add("repair.least_limb", &least_limb, {0.0, 1.0}, "smallest lost part, as a share of the object");
+}
+
+InstanceMemory::InstanceMemory(const Camera& camera, const MaskCarryOptions& carry,
+                               const InstanceMemoryOptions& options)
+    : carry_(camera, carry), options_(options) {}
+
+void InstanceMemory::reset() {
+  tracks_.clear();
+  previous_ = CarryFrame();
+}
+
+struct InstanceMemory::Step {
+  const CarryFrame& present;
+  const std::optional<SE3>& cur_from_prev;
+  bool lacking;
+  Segmentation& segmentation;
+  std::size_t segmented;              // instances that the segmenter gave
+  std::vector<std::size_t> track_of;  // per segmented instance; kNone = new
+  std::vector<bool> found;            // per track
+  MemoryReport report;
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+};
+
+MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional<SE3>& cur_from_prev, bool lacking,
+                                  Segmentation& segmentation) {
+  Step step{present, cur_from_prev, lacking, segmentation, segmentation.instances.size(), {}, {}, {}};
+  step.track_of.assign(step.segmented, Step::kNone);
+  step.found.assign(tracks_.size(), false);
+  match(step);
+  for (std::size_t i = 0; i < step.segmented; ++i)
+    if (step.track_of[i] != Step::kNone) follow(step, tracks_[step.track_of[i]], segmentation.instances[i]);
+  std::vector<Track> kept;
+  for (std::size_t t = 0; t < tracks_.size(); ++t)
+    if (step.found[t] || restore(step, tracks_[t])) kept.push_back(std::move(tracks_[t]));
+  for (std::size_t i = 0; i < step.segmented; ++i) {
+    Instance& now = segmentation.instances[i];
+    if (now.track.valid() || now.role != Role::kDynamic) continue;
+    now.track = TrackId(next_track_++);
+    Track fresh;
+    fresh.id = now.track;
+    fresh.last = now;
+    fresh.pixels = cv::countNonZero(now.mask);
+    fresh.confirmed = 1;
+    kept.push_back(std::move(fresh));
+  }
+  tracks_ = std::move(kept);
+  previous_ = present;
+  return step.report;
+}
+
+void InstanceMemory::match(Step& step) {
+  struct Candidate {
+    double iou;
+    std::size_t track, instance;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t t = 0; t < tracks_.size(); ++t)
+    for (std::size_t i = 0; i < step.segmented; ++i) {
+      const Instance &before = tracks_[t].last, &now = step.segmentation.instances[i];
+      if (now.role != Role::kDynamic || now.class_name != before.class_name) continue;
+      const double iou =
+          overlap(before.window, before.mask, cv::Point(tracks_[t].shift_px), now.window, now.mask).iou();
+      if (iou >= options_.least_overlap) candidates.push_back({iou, t, i});
+    }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.iou > b.iou; });
+  for (const Candidate& c : candidates) {
+    if (step.found[c.track] || step.track_of[c.instance] != Step::kNone) continue;
+    step.found[c.track] = true;
+    step.track_of[c.instance] = c.track;
+  }
+}
+
+void InstanceMemory::follow(Step& step, Track& track, Instance& now) {
+  const int segmented_px = cv::countNonZero(now.mask);
+  const bool shrunk = segmented_px < (1 - options_.limb_trigger) * track.pixels;
+  const cv::Point2f moved = centre(now) - centre(track.last);
+  const bool extended = (shrunk || step.lacking) && track.confirmed >= options_.confirmations &&
+                        track.extended < options_.longest_carry && extend(step, track, now);
+  track.extended = extended ? track.extended + 1 : 0;
+  track.carried = 0;
+  ++track.confirmed;
+  now.track = track.id;
+  track.last = now;
+  track.pixels = extended ? cv::countNonZero(now.mask) : segmented_px;
+  if (!extended && !shrunk) track.shift_px = moved;
+}
+
+bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
+  const CarriedMask carried =
+      carry_.carry(previous_, step.present, track.last.window, track.last.mask, step.cur_from_prev, track.shift_px);
+  if (carried.outcome != CarryOutcome::kVisible) return false;
+  cv::Mat missing = carried.mask.clone();
+  for (std::size_t i = 0; i < step.segmented; ++i)
+    if (step.segmentation.instances[i].role == Role::kDynamic)
+      subtract(carried.window, missing, step.segmentation.instances[i], kGapPx);
+  cv::morphologyEx(missing, missing, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 5)));
+  const int least = std::max(options_.least_px / 2, static_cast<int>(options_.least_limb * track.pixels));
+  if (keep_large(missing, least) == 0) return false;
+  // Back to where the segmented part ends.
+  cv::dilate(missing, missing, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kGapPx + 1, 2 * kGapPx + 1)));
+  cv::bitwise_and(missing, carried.mask, missing);
+
+  const cv::Rect united = now.window | carried.window;
+  cv::Mat mask = cv::Mat::zeros(united.size(), CV_8UC1);
+  now.mask.copyTo(mask(now.window - united.tl()));
+  const int before = cv::countNonZero(mask);
+  cv::Mat part = mask(carried.window - united.tl());
+  cv::bitwise_or(part, missing, part);
+  step.report.restored_px += cv::countNonZero(mask) - before;
+  ++step.report.extended_instances;
+  const cv::Rect set = cv::boundingRect(mask);
+  place(set + united.tl(), mask(set), now);
+  now.provenance = Provenance::kExtended;
+  track.shift_px = carried.shift_px;
+  return true;
+}
+
+bool InstanceMemory::restore(Step& step, Track& track) {
+  if (track.confirmed < options_.confirmations || track.carried >= options_.longest_carry) return false;
+  CarriedMask carried =
+      carry_.carry(previous_, step.present, track.last.window, track.last.mask, step.cur_from_prev, track.shift_px);
+  if (carried.outcome != CarryOutcome::kVisible) return false;
+  const int carried_px = cv::countNonZero(carried.mask);
+  int left = carried_px;
+  for (std::size_t i = 0; i < step.segmented; ++i)
+    if (step.segmentation.instances[i].role == Role::kDynamic)
+      left = subtract(carried.window, carried.mask, step.segmentation.instances[i], 0);
+  if (left < options_.least_px || left < kMerged * carried_px) return false;
+  // What fades at the border is leaving, not missed.
+  if (at_border(carried.window, step.segmentation.size) && carried.inside < 0.5 && track.carried > 0) return false;
+
+  Instance now = track.last;
+  const cv::Rect set = cv::boundingRect(carried.mask);
+  place(set + carried.window.tl(), carried.mask(set).clone(), now);
+  now.id = InstanceId(static_cast<std::uint32_t>(step.segmentation.instances.size()));
+  now.provenance = Provenance::kRestored;
+  now.track = track.id;
+  track.last = now;
+  track.pixels = left;
+  track.shift_px = carried.shift_px;
+  ++track.carried;
+  track.extended = 0;
+  ++step.report.restored_instances;
+  step.report.restored_px += left;
+  step.segmentation.instances.push_back(std::move(now));
+  return true;
+}
+
+}  // namespace semvslam
