@@ -62,7 +62,9 @@ struct MotionCheckOptions {
 struct MotionCheckResult {
   std::vector<TrackMotion> tracks;  // as the tracks given
   CameraMotion camera;              // cur_from_prev and where it comes from
-  FundamentalEstimate fundamental;  // between the previous frame and this one
+  FundamentalEstimate fundamental;  // from the frame `fundamental_age` frames ago to this one
+  int fundamental_age = 0;
+  double noise_scale = 1;  // >= 1: by how much this frame's points scatter more than the options say (blur, shake)
   int moving = 0, at_rest = 0, unknown = 0;
 };
 
@@ -90,19 +92,27 @@ class MotionCheck {
   struct Pose {
     FrameId frame;
     SE3 camera_from_world;
+    bool given = false;     // by the caller; the others were chained here
+    bool doubtful = false;  // only predicted
   };
-  struct Memory {
-    int frames_since_moving = 0;
-  };
-  const SE3* pose_of(FrameId frame) const;
-  TrackMotion judge(const FlowTrack& track, const MotionCheckResult& result) const;
+  const Pose* pose_of(FrameId frame) const;
+  CameraMotion find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks);
+  void add_pose(const MotionFrame& frame, const CameraMotion& motion);
+  FundamentalEstimate find_fundamental(std::span<const FlowTrack> tracks, int age) const;
+  TrackMotion measure(const FlowTrack& track, const MotionCheckResult& result) const;
+  void measure_on_segment(const TrackSample& then, const Eigen::Vector2d& pixel, const SE3& now_from_then,
+                          TrackMotion& motion) const;
+  double noise_scale(std::span<const TrackMotion> motions, std::span<const FlowTrack> tracks) const;
+  void decide(const FlowTrack& track, const MotionCheckResult& result, TrackMotion& motion) const;
+
+  static constexpr double kMaxNoiseScale = 4;
 
   Camera camera_;
   MotionCheckOptions options_;
   CameraMotionOptions camera_options_;
   FundamentalOptions fundamental_options_;
-  std::vector<Pose> poses_;  // oldest first
-  std::unordered_map<TrackId, Memory> moved_;
+  std::vector<Pose> poses_;                 // oldest first
+  std::unordered_map<TrackId, int> moved_;  // frames since it was last seen to move
 };
 
 }  // namespace semvslam

@@ -44,7 +44,7 @@ class MotionDetector {
   void forget_poses() { check_.forget_poses(); }
 
   /// Verdicts for points of the last frame that are no tracks themselves (features): moving inside a region; else as
-  /// the nearest track within `radius_px` whose depth is alike; else unknown.
+  /// the nearest track within 12 px whose depth is alike; else unknown.
   /// @param pixels recorded. @param depths_m as many, 0 = not measured. @param verdicts is resized.
   void judge(std::span<const cv::Point2f> pixels, std::span<const float> depths_m,
              std::vector<MotionVerdict>& verdicts) const;

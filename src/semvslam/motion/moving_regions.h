@@ -5,9 +5,12 @@
 #include <opencv2/core.hpp>
 #include <span>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
+#include "semvslam/motion/depth_seeds.h"
 #include "semvslam/motion/motion_check.h"
+#include "semvslam/motion/region_growth.h"
 
 namespace semvslam {
 
@@ -58,10 +61,36 @@ class MovingRegions {
   void reset();
 
  private:
+  struct Evidence {  // a moving track or a depth seed
+    cv::Point2f pixel;
+    float depth_m = 0;
+    TrackId track;  // invalid: a depth seed
+    Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();
+  };
+  struct Kept {
+    MovingRegion region;
+    std::unordered_map<TrackId, double> members;  // when each was last seen to move, s
+    std::vector<Evidence> fresh;                  // of this frame
+    std::vector<Evidence> anchors;                // fresh ones and members that rest
+    cv::Mat cells;                                // CV_8UC1 on the raster of CellGrid
+  };
+  std::vector<Evidence> collect(const MotionFrame& frame, std::span<const FlowTrack> tracks,
+                                const MotionCheckResult& motion);
+  bool is_unclaimed(const MotionFrame& frame, const cv::Point2f& pixel) const;
+  bool belong_together(const Evidence& a, const Evidence& b) const;
+  void carry(const MotionFrame& frame, const CellGrid& before, const MotionCheckResult& motion);
+  void assign(const MotionFrame& frame, std::vector<Evidence>& evidence);
+  void update(Kept& kept, const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion);
+  void merge();
+  void draw();
+
   Camera camera_;
   MovingRegionOptions options_;
-  MotionCheckOptions check_options_;
+  DepthSeeds depth_seeds_;
   std::uint32_t next_id_ = 0;
+  double last_time_s_ = 0;
+  CellGrid grid_;  // of the last frame
+  std::vector<Kept> kept_;
   std::vector<MovingRegion> regions_;
   cv::Mat mask_;
 };

@@ -1,0 +1,63 @@
+#include "semvslam/motion/depth_seeds.h"
+
+#include <cmath>
+
+namespace semvslam {
+namespace {
+
+constexpr std::size_t kFramesBack = 6;
+constexpr int kEdgeMarginPx = 4;     // around the place in the earlier image everything must be farther
+constexpr double kLeastGapM = 0.06;  // and by at least so much
+
+}  // namespace
+
+DepthSeeds::DepthSeeds(const Camera& camera, const MotionCheckOptions& options, int step_px)
+    : camera_(camera), options_(options), step_px_(step_px) {}
+
+bool DepthSeeds::was_empty(const Past& past, const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d p = past.past_from_cur * point;
+  if (p.z() < 0.2) return false;
+  const Eigen::Vector2d pixel = camera_.distort(camera_.project(p));
+  const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
+  if (x < kEdgeMarginPx || y < kEdgeMarginPx || x >= past.depth.cols - kEdgeMarginPx ||
+      y >= past.depth.rows - kEdgeMarginPx)
+    return false;
+  const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
+  for (const int dy : {0, -kEdgeMarginPx, kEdgeMarginPx})
+    for (const int dx : {0, -kEdgeMarginPx, kEdgeMarginPx}) {
+      const double z = motion_depth_m(past.depth, unit, x + dx, y + dy);
+      if (!(z > 0)) return false;  // nothing measured: the thing may have been there
+      const double noise = options_.depth_sigma_per_m2 * std::hypot(z * z, p.z() * p.z());
+      const double sigma = std::hypot(noise, options_.depth_bias_share * z);
+      if (z - p.z() < std::max(kLeastGapM, options_.moving_sigmas * sigma)) return false;
+    }
+  return true;
+}
+
+const std::vector<DepthSeed>& DepthSeeds::step(const cv::Mat& depth, const std::optional<SE3>& cur_from_prev) {
+  seeds_.clear();
+  if (!cur_from_prev || depth.empty()) past_.clear();
+  if (depth.empty()) return seeds_;
+  if (cur_from_prev) {
+    const SE3 prev_from_cur = cur_from_prev->inverse();
+    for (Past& past : past_) past.past_from_cur = past.past_from_cur * prev_from_cur;
+  }
+  if (past_.size() > 1) {
+    const Past& past = past_.front();
+    const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
+    for (int y = step_px_ / 2; y < depth.rows; y += step_px_)
+      for (int x = step_px_ / 2; x < depth.cols; x += step_px_) {
+        const float z = motion_depth_m(depth, unit, x, y);
+        if (!(z > 0)) continue;
+        // A first look without the lens and without neighbours spares most places the full test.
+        const Eigen::Vector2d ideal = camera_.undistort(Eigen::Vector2d(x, y));
+        const Eigen::Vector3d point = camera_.back_project(ideal, z);
+        if (was_empty(past, point)) seeds_.push_back({{x, y}, z});
+      }
+  }
+  past_.push_back({depth, SE3()});
+  if (past_.size() > kFramesBack) past_.pop_front();
+  return seeds_;
+}
+
+}  // namespace semvslam

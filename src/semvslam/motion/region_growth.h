@@ -1,0 +1,45 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+#include <vector>
+
+#include "semvslam/geometry/camera.h"
+
+namespace semvslam {
+
+/// Where a region starts from, or what holds it back. Recorded pixels.
+struct GrowthSeed {
+  cv::Point2f pixel;
+  float depth_m = 0;  // 0 = unknown
+};
+
+struct GrowthLimits {
+  double margin_px = 25;      // beyond the hull of the seeds
+  double reach_m = 0.35;      // in depth, from the seed that a place was reached from
+  double step_share = 0.025;  // of the depth: a larger step between neighbours is an edge
+};
+
+/// The image on a coarse raster: masks of regions are made there.
+struct CellGrid {
+  static constexpr int kCellPx = 4;
+  int columns = 0, rows = 0;
+  std::vector<float> depth_m;  // per cell; 0 = not measured
+
+  CellGrid() = default;
+  /// @param depth CV_16UC1 or CV_32FC1, or empty: no depth anywhere.
+  CellGrid(const Camera& camera, const cv::Mat& depth);
+  std::size_t size() const { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
+  int cell_of(const cv::Point2f& pixel) const;
+  cv::Point2f centre(int cell) const {
+    return {static_cast<float>(cell % columns * kCellPx) + 1.5f, static_cast<float>(cell / columns * kCellPx) + 1.5f};
+  }
+};
+
+/// Grows a region from the seeds over cells whose depth continues smoothly, within a margin of the seeds' convex hull.
+/// Places nearer (along the surface) to one of `against` than to a seed are not taken.
+/// @return CV_8UC1, rows x columns of the grid, 255 = taken.
+cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std::span<const GrowthSeed> against,
+                    const GrowthLimits& limits);
+
+}  // namespace semvslam
