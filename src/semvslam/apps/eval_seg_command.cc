@@ -7,10 +7,10 @@
 #include <string>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/apps/segmenter_options.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/semantic/segmentation_files.h"
 #include "semvslam/semantic/segmentation_score.h"
-#include "semvslam/semantic/segmenter.h"
 
 namespace semvslam {
 namespace {
@@ -93,16 +93,7 @@ CommandHandler setup_eval_seg(CLI::App& parser) {
       ->capture_default_str()
       ->check(CLI::Range(0.0, 1.0));
   parser.add_option("--json", a->json, "write all numbers to this file (- = standard output, alone)");
-  parser.add_option("--model", a->options.model, "folder with model.json (default: the network that comes along)");
-  parser.add_option("--threads", a->options.threads, "threads of the network")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 64));
-  parser.add_option("--backend", a->options.backend, "auto, openvino or opencv")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "openvino", "opencv"}));
-  parser.add_option("--precision", a->options.precision, "auto or f32")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "f32"}));
+  add_segmenter_options(parser, a->options);
   return [a] { return run_eval_seg(*a); };
 }
 

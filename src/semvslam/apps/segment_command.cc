@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/apps/segmenter_options.h"
 #include "semvslam/semantic/segmentation_files.h"
-#include "semvslam/semantic/segmenter.h"
 
 namespace semvslam {
 namespace {
@@ -55,19 +55,10 @@ CommandHandler setup_segment(CLI::App& parser) {
   auto a = std::make_shared<SegmentArguments>();
   parser.add_option("IMAGE", a->images, "pictures to segment")->required();
   parser.add_option("--out", a->out, "folder for overlays, instance images (PNG) and JSON");
-  parser.add_option("--model", a->options.model, "folder with model.json (default: the network that comes along)");
   parser.add_option("--score", a->options.score, "least score of an object")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1.0));
-  parser.add_option("--threads", a->options.threads, "threads of the network")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 64));
-  parser.add_option("--backend", a->options.backend, "auto, openvino or opencv")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "openvino", "opencv"}));
-  parser.add_option("--precision", a->options.precision, "auto or f32")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "f32"}));
+  add_segmenter_options(parser, a->options);
   return [a] { return run_segment(*a); };
 }
 

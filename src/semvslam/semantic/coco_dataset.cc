@@ -2,89 +2,11 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace semvslam {
 namespace {
-
-struct Point {
-  int x, y;
-};
-
-/// The pixels of a polygon's outline on a grid five times as fine, in order.
-std::vector<Point> fine_outline(const std::vector<double>& polygon, double scale) {
-  const std::size_t n = polygon.size() / 2;
-  std::vector<Point> corners;
-  for (std::size_t i = 0; i < n; ++i)
-    corners.push_back(
-        {static_cast<int>(scale * polygon[2 * i] + .5), static_cast<int>(scale * polygon[2 * i + 1] + .5)});
-  corners.push_back(corners[0]);
-  std::vector<Point> out;
-  for (std::size_t i = 0; i < n; ++i) {
-    Point a = corners[i], b = corners[i + 1];
-    const int dx = std::abs(b.x - a.x), dy = std::abs(b.y - a.y);
-    const bool flip = (dx >= dy && a.x > b.x) || (dx < dy && a.y > b.y);
-    if (flip) std::swap(a, b);
-    const int steps = std::max(dx, dy);
-    const double slope = steps == 0 ? 0
-                         : dx >= dy ? static_cast<double>(b.y - a.y) / dx
-                                    : static_cast<double>(b.x - a.x) / dy;
-    for (int d = 0; d <= steps; ++d) {
-      const int t = flip ? steps - d : d;
-      out.push_back(dx >= dy ? Point{t + a.x, static_cast<int>(a.y + slope * t + .5)}
-                             : Point{static_cast<int>(a.x + slope * t + .5), t + a.y});
-    }
-  }
-  return out;
-}
-
-/// Fills a polygon as the COCO tools do (their rleFrPoly): where the outline crosses a column of pixel centres, the
-/// state below flips. Written after their description; the same pixels matter because scores are compared.
-void fill(const std::vector<double>& polygon, cv::Mat& mask) {
-  constexpr double kScale = 5;
-  const std::vector<Point> outline = fine_outline(polygon, kScale);
-  std::vector<std::size_t> flips;
-  const auto height = static_cast<std::size_t>(mask.rows);
-  for (std::size_t j = 1; j < outline.size(); ++j) {
-    const Point& p = outline[j];
-    const Point& q = outline[j - 1];
-    if (p.x == q.x) continue;
-    const double x = ((p.x < q.x ? p.x : p.x - 1) + .5) / kScale - .5;
-    if (std::floor(x) != x || x < 0 || x > mask.cols - 1) continue;
-    const double y = std::clamp((std::min(p.y, q.y) + .5) / kScale - .5, 0., static_cast<double>(mask.rows));
-    flips.push_back(static_cast<std::size_t>(x) * height + static_cast<std::size_t>(std::ceil(y)));
-  }
-  std::sort(flips.begin(), flips.end());
-  for (std::size_t i = 0; i + 1 < flips.size(); i += 2)
-    for (std::size_t at = flips[i]; at < flips[i + 1]; ++at)
-      mask.at<std::uint8_t>(static_cast<int>(at % height), static_cast<int>(at / height)) = 255;
-}
-
-/// COCO's compressed run lengths: six bits a character, each run from the third on as a difference to the one before
-/// last.
-std::vector<std::uint32_t> unpack_runs(const std::string& text) {
-  std::vector<std::uint32_t> out;
-  for (std::size_t p = 0; p < text.size();) {
-    std::int64_t x = 0;
-    int k = 0;
-    bool more = true;
-    while (more && p < text.size() && k < 7) {
-      const std::int64_t c = text[p] - 48;
-      x |= (c & 0x1f) << (5 * k);
-      more = (c & 0x20) != 0;
-      ++p;
-      ++k;
-      if (!more && (c & 0x10) != 0) x |= -(std::int64_t{1} << (5 * k));
-    }
-    if (out.size() > 2) x += out[out.size() - 2];
-    out.push_back(static_cast<std::uint32_t>(x));
-  }
-  return out;
-}
 
 CocoObject parse_object(const nlohmann::json& j) {
   CocoObject o;
@@ -93,33 +15,11 @@ CocoObject parse_object(const nlohmann::json& j) {
   const auto box = j.at("bbox").get<std::vector<double>>();
   if (box.size() != 4) throw std::invalid_argument("a 'bbox' has not four numbers");
   o.box = {box[0], box[1], box[2], box[3]};
-  const nlohmann::json& region = j.at("segmentation");
-  if (region.is_array()) {
-    for (const nlohmann::json& p : region)
-      if (auto polygon = p.get<std::vector<double>>(); polygon.size() >= 6) o.polygons.push_back(std::move(polygon));
-  } else {
-    const nlohmann::json& counts = region.at("counts");
-    o.runs = counts.is_string() ? unpack_runs(counts.get<std::string>()) : counts.get<std::vector<std::uint32_t>>();
-  }
+  o.region = CocoRegion::parse(j.at("segmentation"));
   return o;
 }
 
 }  // namespace
-
-cv::Mat CocoObject::mask(cv::Size size) const {
-  cv::Mat out = cv::Mat::zeros(size, CV_8UC1);
-  for (const std::vector<double>& p : polygons) fill(p, out);
-  std::size_t at = 0;
-  const std::size_t height = static_cast<std::size_t>(size.height), end = height * static_cast<std::size_t>(size.width);
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const std::size_t until = std::min<std::size_t>(end, at + runs[i]);
-    if (i % 2 == 1)
-      for (std::size_t k = at; k < until; ++k)
-        out.at<std::uint8_t>(static_cast<int>(k % height), static_cast<int>(k / height)) = 255;
-    at = until;
-  }
-  return out;
-}
 
 Result<CocoDataset> CocoDataset::read(const std::filesystem::path& json) {
   std::ifstream stream(json);

@@ -7,19 +7,16 @@
 #include <vector>
 
 #include "semvslam/base/result.h"
+#include "semvslam/semantic/coco_region.h"
 
 namespace semvslam {
 
-/// One labelled object. Its region is kept as drawn and made into pixels when asked for.
+/// One labelled object.
 struct CocoObject {
   int category = 0;    // COCO's id
   bool crowd = false;  // neither object nor background
   cv::Rect2d box;
-  std::vector<std::vector<double>> polygons;  // x0 y0 x1 y1 ...
-  std::vector<std::uint32_t> runs;  // run lengths, column by column, where the region is not drawn as polygons
-
-  /// CV_8UC1, 255 = object; pixel for pixel what pycocotools makes of it.
-  cv::Mat mask(cv::Size size) const;
+  CocoRegion region;
 };
 
 struct CocoImage {

@@ -9,12 +9,18 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <string_view>
+
+#include "semvslam/data/file_io.h"
+#include "semvslam/semantic/coco_region.h"
 
 namespace semvslam {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr std::int64_t kLargestGapNs = 20'000'000;
+constexpr std::size_t kMostJsonBytes = std::size_t{1} << 26;
 
 /// Seconds with nine digits behind the point at most, exactly; 0 for anything else.
 std::optional<TimeStamp> stamp_of(const std::string& stem) {
@@ -29,6 +35,23 @@ std::optional<TimeStamp> stamp_of(const std::string& stem) {
   return TimeStamp{ns};
 }
 
+/// The image that a file belongs to; nothing for files that hold no masks.
+std::optional<std::string> image_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  if (file.extension() == ".json") return stem == "roles" ? std::nullopt : std::optional(stem);
+  if (file.extension() != ".png" || stem.ends_with(".overlay")) return std::nullopt;
+  constexpr std::string_view kInstances = ".instances";
+  return stem.ends_with(kInstances) ? stem.substr(0, stem.size() - kInstances.size()) : stem;
+}
+
+Error wrong_file(const fs::path& file, const std::string& what) {
+  return {ErrorCode::kInvalidInput, fmt::format("{}: {}", file.string(), what)};
+}
+
+std::string differs(cv::Size file, cv::Size image) {
+  return fmt::format("is {}x{}, the image {}x{}", file.width, file.height, image.width, image.height);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder, const RoleTable& roles) {
@@ -39,31 +62,39 @@ Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder,
   out->folder_ = folder;
   out->roles_ = roles;
   for (const fs::directory_entry& e : fs::directory_iterator(folder, ec)) {
-    if (e.path().extension() != ".png") continue;
-    const std::string stem = e.path().stem().string();
-    out->by_name_[stem] = e.path();
-    if (const auto stamp = stamp_of(stem)) out->by_stamp_[*stamp] = e.path();
+    const std::optional<std::string> image = image_of(e.path());
+    if (!image) continue;
+    fs::path& file = out->by_name_[*image];
+    if (file.extension() != ".json") file = e.path();
+    if (const auto stamp = stamp_of(*image)) out->by_stamp_[*stamp] = file;
   }
-  if (out->by_name_.empty()) return Error{ErrorCode::kNotFound, fmt::format("{}: holds no PNG file", folder.string())};
+  if (out->by_name_.empty())
+    return Error{ErrorCode::kNotFound, fmt::format("{}: holds no PNG or JSON file with masks", folder.string())};
+  if (const Status s = out->read_roles(); !s) return s.error();
+  if (out->names_.empty()) out->names_.push_back("person");
+  return std::unique_ptr<Segmenter>(std::move(out));
+}
 
-  for (const fs::path& file : {folder / "roles.json", folder.parent_path() / "roles.json"}) {
+Status FolderSegmenter::read_roles() {
+  for (const fs::path& file : {folder_ / "roles.json", folder_.parent_path() / "roles.json"}) {
     std::ifstream stream(file);
     if (!stream) continue;
     try {
       const nlohmann::json listed = nlohmann::json::parse(stream);
-      for (const nlohmann::json& role : listed) {
-        const auto label = role.at("label").get<std::string>();
-        auto at = std::find(out->names_.begin(), out->names_.end(), label);
-        if (at == out->names_.end()) at = out->names_.insert(at, label);
-        out->class_of_number_[role.at("number").get<int>()] = static_cast<int>(at - out->names_.begin());
-      }
+      for (const nlohmann::json& role : listed)
+        class_of_number_[role.at("number").get<int>()] = class_of(role.at("label").get<std::string>());
     } catch (const nlohmann::json::exception& e) {
-      return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file.string(), e.what())};
+      return wrong_file(file, e.what());
     }
     break;
   }
-  if (out->names_.empty()) out->names_.push_back("person");
-  return std::unique_ptr<Segmenter>(std::move(out));
+  return Status::success();
+}
+
+int FolderSegmenter::class_of(const std::string& name) {
+  auto at = std::find(names_.begin(), names_.end(), name);
+  if (at == names_.end()) at = names_.insert(at, name);
+  return static_cast<int>(at - names_.begin());
 }
 
 const fs::path* FolderSegmenter::find(const SegmentationRequest& request) const {
@@ -89,15 +120,19 @@ Result<Segmentation> FolderSegmenter::segment(const SegmentationRequest& request
   Segmentation out{request.frame, request.stamp, request.image.size(), {}};
   const fs::path* file = find(request);
   if (!file) return out;
-  cv::Mat labels = cv::imread(file->string(), cv::IMREAD_UNCHANGED);
-  const auto wrong = [&](const std::string& what) {
-    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file->string(), what)};
-  };
-  if (labels.empty()) return wrong("is no readable PNG");
-  if (labels.type() != CV_8UC1 && labels.type() != CV_16UC1) return wrong("a mask has one channel of 8 or 16 bits");
-  if (labels.size() != request.image.size())
-    return wrong(
-        fmt::format("is {}x{}, the image {}x{}", labels.cols, labels.rows, request.image.cols, request.image.rows));
+  const Status s = file->extension() == ".json" ? read_json(*file, out) : read_labels(*file, out);
+  if (!s) return s.error();
+  return out;
+}
+
+Status FolderSegmenter::read_labels(const fs::path& file, Segmentation& out) const {
+  std::vector<std::uint8_t> bytes;
+  if (Status s = read_binary_file(file, bytes); !s) return s;
+  cv::Mat labels = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+  if (labels.empty()) return wrong_file(file, "is no readable PNG");
+  if (labels.type() != CV_8UC1 && labels.type() != CV_16UC1)
+    return wrong_file(file, "a mask has one channel of 8 or 16 bits");
+  if (labels.size() != out.size) return wrong_file(file, differs(labels.size(), out.size));
   labels.convertTo(labels, CV_16U);
 
   std::map<int, cv::Rect> windows;
@@ -127,7 +162,35 @@ Result<Segmentation> FolderSegmenter::segment(const SegmentationRequest& request
     i.mask = labels(window) == number;
     out.instances.push_back(std::move(i));
   }
-  return out;
+  return Status::success();
+}
+
+Status FolderSegmenter::read_json(const fs::path& file, Segmentation& out) {
+  const Result<std::string> text = read_text_file(file, kMostJsonBytes);
+  if (!text) return text.error();
+  try {
+    const nlohmann::json root = nlohmann::json::parse(*text);
+    const cv::Size size(root.at("width").get<int>(), root.at("height").get<int>());
+    if (size != out.size) return wrong_file(file, differs(size, out.size));
+    for (const nlohmann::json& found : root.at("instances")) {
+      const cv::Mat whole = CocoRegion::parse(found.at("segmentation")).mask(size);
+      const cv::Rect window = cv::boundingRect(whole);
+      if (window.empty()) continue;
+      Instance i;
+      i.id = InstanceId(static_cast<std::uint32_t>(out.instances.size()));
+      i.class_name = found.at("class").get<std::string>();
+      i.class_index = class_of(i.class_name);
+      i.role = roles_.role(i.class_name);
+      i.score = found.value("score", 1.f);
+      i.box = cv::Rect2f(window);
+      i.window = window;
+      i.mask = whole(window).clone();
+      out.instances.push_back(std::move(i));
+    }
+  } catch (const std::exception& e) {
+    return wrong_file(file, e.what());
+  }
+  return Status::success();
 }
 
 std::string FolderSegmenter::description() const {

@@ -7,23 +7,31 @@
 
 namespace semvslam {
 
-/// Masks made elsewhere: a folder of single-channel PNG files, one per image. Pixel value 0 = nothing, n = object n of
-/// that image. `roles.json` in the folder or beside it names the class of each number: a list of
-/// {"number": 1, "label": "person"}; without it every number is a person.
+/// Masks made elsewhere: a folder with one file per image.
+/// - PNG, one channel of 8 or 16 bits: 0 = nothing, n = object n of that image. `roles.json` in the folder or beside it
+///   names the class of each number: a list of {"number": 1, "label": "person"}; without it every number is a person.
+/// - JSON, as `semvslam segment` writes it: {"width", "height", "instances": [{"class", "segmentation", "score"}]},
+///   the segmentation as in the COCO data set (polygons or run lengths), the score optional. Wins over a PNG.
+/// What `segment` writes beside its JSON (x.overlay.png, x.instances.png) is passed over.
 class FolderSegmenter final : public Segmenter {
  public:
-  /// Errors: no such folder, no PNG file in it, a roles.json that is damaged.
+  /// Errors: no such folder, no such file in it, a roles.json that is damaged.
   static Result<std::unique_ptr<Segmenter>> open(const std::filesystem::path& folder, const RoleTable& roles);
 
-  /// The mask with the request's name, else with the nearest stamp within 20 ms. No mask = no instances. Errors: a
+  /// The file with the request's name, else with the nearest stamp within 20 ms. No file = no instances. Errors: a
   /// damaged file, another size than the image's.
   Result<Segmentation> segment(const SegmentationRequest& request) override;
+  /// Grows with the classes that JSON files name; a class keeps its place.
   const std::vector<std::string>& class_names() const override { return names_; }
   std::string description() const override;
 
  private:
   FolderSegmenter() = default;
   const std::filesystem::path* find(const SegmentationRequest& request) const;
+  Status read_roles();
+  Status read_labels(const std::filesystem::path& file, Segmentation& out) const;
+  Status read_json(const std::filesystem::path& file, Segmentation& out);
+  int class_of(const std::string& name);
 
   std::filesystem::path folder_;
   std::map<std::string, std::filesystem::path> by_name_;  // file name without extension

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "semvslam/semantic/segmentation_files.h"
+
 namespace semvslam {
 namespace {
 
@@ -60,8 +62,10 @@ TEST_F(FolderSegmenterTest, DamagedFilesAndMissingFoldersAreErrors) {
   std::ofstream(folder_ / "mask" / "20.0.png") << "no picture";
   const auto segmenter = FolderSegmenter::open(folder_ / "mask", RoleTable());
   EXPECT_FALSE((*segmenter)->segment(request(20)));
+  std::ofstream(folder_ / "mask" / "20.0.png", std::ios::trunc);  // 0 bytes
+  EXPECT_FALSE((*segmenter)->segment(request(20)));
   EXPECT_FALSE(FolderSegmenter::open(folder_ / "absent", RoleTable()));
-  EXPECT_FALSE(FolderSegmenter::open(folder_, RoleTable()));  // no PNG in it
+  EXPECT_FALSE(FolderSegmenter::open(folder_, RoleTable()));  // nothing in it but roles.json
   std::ofstream(folder_ / "roles.json") << "{";
   EXPECT_FALSE(FolderSegmenter::open(folder_ / "mask", RoleTable()));
 }
@@ -70,6 +74,60 @@ TEST_F(FolderSegmenterTest, WithoutRolesEverythingIsAPerson) {
   fs::remove(folder_ / "roles.json");
   const auto segmenter = FolderSegmenter::open(folder_ / "mask", RoleTable());
   EXPECT_EQ((*segmenter)->segment(request(12.5))->pixels_of_class("person"), 24);
+}
+
+TEST_F(FolderSegmenterTest, ReadsWhatTheSegmentCommandWrites) {
+  Segmentation written{FrameId(0), TimeStamp{}, {20, 10}, {}};
+  for (const auto& [name, window] : {std::pair("cup", cv::Rect(0, 0, 3, 4)), {"person", cv::Rect(12, 3, 8, 7)}}) {
+    Instance i;
+    i.class_name = name;
+    i.score = 0.75f;
+    i.window = window;
+    i.box = cv::Rect2f(window);
+    i.mask = cv::Mat(window.size(), CV_8UC1, cv::Scalar(255));
+    written.instances.push_back(i);
+  }
+  written.instances[1].mask.at<std::uint8_t>(6, 7) = 0;
+  const cv::Mat picture(10, 20, CV_8UC3, cv::Scalar::all(9));
+  ASSERT_TRUE(write_segmentation(folder_ / "mask", "12.500000", picture, written));  // beside a PNG of that image
+  ASSERT_TRUE(write_segmentation(folder_ / "mask", "14", picture, written));
+  const auto segmenter = FolderSegmenter::open(folder_ / "mask", RoleTable());
+  ASSERT_TRUE(segmenter) << segmenter.error().message;
+  for (const double stamp_s : {12.5, 14.}) {
+    const Result<Segmentation> s = (*segmenter)->segment(request(stamp_s));
+    ASSERT_TRUE(s) << s.error().message;
+    ASSERT_EQ(s->instances.size(), 2u);
+    EXPECT_EQ(s->instances[0].class_name, "cup");
+    EXPECT_EQ((*segmenter)->class_names()[static_cast<std::size_t>(s->instances[0].class_index)], "cup");
+    EXPECT_FLOAT_EQ(s->instances[0].score, 0.75f);
+    EXPECT_EQ(s->instances[1].window, cv::Rect(12, 3, 8, 7));
+    EXPECT_EQ(cv::norm(s->instances[1].mask, written.instances[1].mask, cv::NORM_INF), 0);
+  }
+}
+
+TEST_F(FolderSegmenterTest, JsonWithPolygonsAndWithoutScores) {
+  std::ofstream(folder_ / "mask" / "3.json") << R"({"width": 20, "height": 10, "instances": [
+    {"class": "dog", "segmentation": [[2, 2, 8, 2, 8, 6, 2, 6]]}, {"class": "cup", "segmentation": []}]})";
+  const auto segmenter = FolderSegmenter::open(folder_ / "mask", RoleTable());
+  const Result<Segmentation> s = (*segmenter)->segment(request(3));
+  ASSERT_TRUE(s) << s.error().message;
+  ASSERT_EQ(s->instances.size(), 1u);  // an empty region is none
+  EXPECT_EQ(s->instances[0].score, 1.f);
+  EXPECT_EQ(s->instances[0].role, Role::kDynamic);
+  EXPECT_EQ(s->pixels_of_class("dog"), 24);
+}
+
+TEST_F(FolderSegmenterTest, DamagedJsonIsAnErrorThatNamesTheFile) {
+  for (const char* text :
+       {"", "{", "[]", R"({"width": 20, "height": 10})", R"({"width": 21, "height": 10, "instances": []})",
+        R"({"width": 20, "height": 10, "instances": [{"class": "dog"}]})",
+        R"({"width": 20, "height": 10, "instances": [{"class": 4, "segmentation": [[2, 2, 8, 2, 8, 6]]}]})"}) {
+    std::ofstream(folder_ / "mask" / "3.json") << text;
+    const auto segmenter = FolderSegmenter::open(folder_ / "mask", RoleTable());
+    const Result<Segmentation> s = (*segmenter)->segment(request(3));
+    ASSERT_FALSE(s) << text;
+    EXPECT_THAT(s.error().message, HasSubstr("3.json"));
+  }
 }
 
 }  // namespace

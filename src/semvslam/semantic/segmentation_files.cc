@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "semvslam/data/file_io.h"
+#include "semvslam/semantic/coco_region.h"
 #include "semvslam/semantic/image_input.h"
 
 namespace semvslam {
@@ -62,7 +63,10 @@ std::string to_json(const Segmentation& segmentation) {
                                 {"role", to_string(i.role)},
                                 {"score", i.score},
                                 {"box", {i.box.x, i.box.y, i.box.x + i.box.width, i.box.y + i.box.height}},
-                                {"pixels", cv::countNonZero(i.mask)}});
+                                {"pixels", cv::countNonZero(i.mask)},
+                                {"segmentation",
+                                 {{"size", {segmentation.size.height, segmentation.size.width}},
+                                  {"counts", pack_region(i.mask, i.window, segmentation.size)}}}});
   return out.dump(1) + "\n";
 }
 

@@ -18,7 +18,9 @@ cv::Mat draw_overlay(const cv::Mat& bgr, const Segmentation& segmentation);
 /// Errors: not writable.
 Status write_picture(const std::filesystem::path& file, const cv::Mat& image);
 
-/// {"width", "height", "instances": [{"class", "role", "score", "box": [x0, y0, x1, y1], "pixels"}]}
+/// {"width", "height", "instances": [{"class", "role", "score", "box": [x0, y0, x1, y1], "pixels",
+/// "segmentation": {"size", "counts"}}]}, the last as COCO's compressed run lengths; a folder of these is a source of
+/// masks
 std::string to_json(const Segmentation& segmentation);
 
 /// Writes `stem`.overlay.png, `stem`.instances.png (16 bit: 0 = none, n = n-th instance) and `stem`.json into a folder.

@@ -37,7 +37,7 @@ void SegmentationScorer::add(const CocoImage& image, const Segmentation& found) 
     std::vector<bool> crowd;
     for (const CocoObject& o : image.objects)
       if (o.category == id) {
-        truth.push_back(o.mask(image.size));
+        truth.push_back(o.region.mask(image.size));
         crowd.push_back(o.crowd);
       }
     std::vector<const Instance*> mine;

@@ -23,9 +23,9 @@ class SegmentationScoreTest : public ::testing::Test {
   ~SegmentationScoreTest() override { fs::remove(path_); }
 
   static cv::Mat mask_of(const nlohmann::json& detection, cv::Size size) {
-    CocoObject o;
-    o.polygons.push_back(detection.at("polygon").get<std::vector<double>>());
-    return o.mask(size);
+    CocoRegion region;
+    region.polygons.push_back(detection.at("polygon").get<std::vector<double>>());
+    return region.mask(size);
   }
 
   const fs::path path_ = fs::temp_directory_path() / ("coco_" + std::to_string(::getpid()) + ".json");
@@ -74,7 +74,7 @@ TEST(SegmentationScore, NothingFoundScoresZeroAndNothingLabelledScoresNothing) {
   CocoImage image{"a.png", {200, 200}, {}};
   CocoObject person;
   person.category = 1;
-  person.polygons = {{10, 10, 150, 10, 150, 150, 10, 150}};
+  person.region.polygons = {{10, 10, 150, 10, 150, 150, 10, 150}};
   image.objects.push_back(person);
   SegmentationScorer with(dataset, 0.5), without(dataset, 0.5);
   Segmentation nothing;
@@ -86,15 +86,6 @@ TEST(SegmentationScore, NothingFoundScoresZeroAndNothingLabelledScoresNothing) {
   EXPECT_EQ(with.score().near_person_recall, 0);
   EXPECT_EQ(without.score().person_mask_ap, -1);
   EXPECT_EQ(without.score().person_pixel_iou, -1);
-}
-
-TEST(CocoDataset, RunLengthsGoDownTheColumns) {
-  CocoObject plain;
-  plain.runs = {6, 3, 2, 3, 6};  // columns of 5 pixels
-  const cv::Mat mask = plain.mask({4, 5});
-  EXPECT_EQ(cv::countNonZero(mask), 6);
-  EXPECT_EQ(mask.at<std::uint8_t>(1, 1), 255);
-  EXPECT_EQ(mask.at<std::uint8_t>(0, 1), 0);
 }
 
 TEST(CocoDataset, DamagedFilesAreNamed) {

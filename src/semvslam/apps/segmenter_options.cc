@@ -1,0 +1,20 @@
+#include "semvslam/apps/segmenter_options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace semvslam {
+
+void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
+  parser.add_option("--model", options.model, "folder with model.json (default: the network that comes along)");
+  parser.add_option("--threads", options.threads, "threads of the network")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 64));
+  parser.add_option("--backend", options.backend, "auto, openvino or opencv")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "openvino", "opencv"}));
+  parser.add_option("--precision", options.precision, "auto or f32")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "f32"}));
+}
+
+}  // namespace semvslam

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "semvslam/semantic/segmenter.h"
+
+namespace CLI {
+class App;
+}
+
+namespace semvslam {
+
+/// The options that `segment` and `eval-seg` share: --model, --threads, --backend, --precision.
+void add_segmenter_options(CLI::App& parser, SegmenterOptions& options);
+
+}  // namespace semvslam
