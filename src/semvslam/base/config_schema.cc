@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 namespace semvslam {
@@ -141,16 +142,19 @@ void ConfigSchema::add_entry(Entry entry, const void* field) {
   entries_.push_back(std::move(entry));
 }
 
-void ConfigSchema::add(std::string key, int* field, Range range, std::string doc) {
+template <typename Number>
+void ConfigSchema::add_number(std::string key, Number* field, Range range, std::string doc) {
+  constexpr bool kWhole = std::is_integral_v<Number>;
   const auto check = [range](const std::string& text) -> Status {
-    int value = 0;
-    if (!parse_number(text, &value)) return invalid("must be an integer, got " + quoted(text));
+    Number value = 0;
+    if (!parse_number(text, &value) || !std::isfinite(static_cast<double>(value)))
+      return invalid((kWhole ? "must be an integer, got " : "must be a number, got ") + quoted(text));
     if (!(value >= range.low && value <= range.high))
       return invalid(fmt::format("must be in {}, got {}", range_to_text(range), value));
     return Status::success();
   };
   add_entry({.key = std::move(key),
-             .type = "integer",
+             .type = kWhole ? "integer" : "number",
              .doc = std::move(doc),
              .default_text = {},
              .range_text = range_to_text(range),
@@ -160,23 +164,12 @@ void ConfigSchema::add(std::string key, int* field, Range range, std::string doc
             field);
 }
 
+void ConfigSchema::add(std::string key, int* field, Range range, std::string doc) {
+  add_number(std::move(key), field, range, std::move(doc));
+}
+
 void ConfigSchema::add(std::string key, double* field, Range range, std::string doc) {
-  const auto check = [range](const std::string& text) -> Status {
-    double value = 0;
-    if (!parse_number(text, &value) || !std::isfinite(value)) return invalid("must be a number, got " + quoted(text));
-    if (!(value >= range.low && value <= range.high))
-      return invalid(fmt::format("must be in {}, got {}", range_to_text(range), value));
-    return Status::success();
-  };
-  add_entry({.key = std::move(key),
-             .type = "number",
-             .doc = std::move(doc),
-             .default_text = {},
-             .range_text = range_to_text(range),
-             .check = check,
-             .assign = [field](const std::string& text) { parse_number(text, field); },
-             .get = [field] { return fmt::format("{}", *field); }},
-            field);
+  add_number(std::move(key), field, range, std::move(doc));
 }
 
 void ConfigSchema::add(std::string key, bool* field, std::string doc) {

@@ -46,6 +46,8 @@ class ConfigSchema {
     std::function<void(const std::string&)> assign;   // after check
     std::function<std::string()> get;
   };
+  template <typename Number>
+  void add_number(std::string key, Number* field, Range range, std::string doc);
   void add_entry(Entry entry, const void* field);
   const Entry* find(std::string_view key) const;
   Error unknown_key(std::string_view key, const std::string& where) const;

@@ -19,11 +19,30 @@ inline Pixel lower(Pixel a, Pixel b) { return a < b ? a : b; }
 inline Pixel upper(Pixel a, Pixel b) { return a > b ? a : b; }
 inline Pixel excess(Pixel a, Pixel b) { return static_cast<Pixel>(a > b ? a - b : 0); }
 
-/// For n pixels from `centre` on: by how much the darkest pixel of the best bright arc exceeds the centre, or the
-/// brightest of the best dark arc falls below it, whichever is more. A corner at threshold t has more than t.
+/// The circle of 16 pixels around a centre, from the top clockwise.
+using Circle = std::array<Pixel, 16>;
+
+/// inner = lower, outer = upper: the darkest pixel of the best bright arc of nine; the other way round, the brightest
+/// of the best dark arc.
 ///
 /// max over arcs of min over nine: the arcs i-1..i+7 and i..i+8 share the eight pixels i..i+7, so that
 /// max(min(eight, p[i-1]), min(eight, p[i+8])) = min(eight, max(p[i-1], p[i+8])), and only the even i are needed.
+template <typename Inner, typename Outer>
+inline Pixel best_arc(const Circle& p, Inner inner, Outer outer) {
+  std::array<Pixel, 8> two, four;  // [i]: of the pixels from 2 i on
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 8; ++i) two[i] = inner(p[2 * i], p[2 * i + 1]);
+#pragma GCC unroll 8
+  for (std::size_t i = 0; i < 8; ++i) four[i] = inner(two[i], two[(i + 1) % 8]);
+  Pixel best = inner(inner(four[0], four[2]), outer(p[15], p[8]));
+#pragma GCC unroll 8
+  for (std::size_t i = 1; i < 8; ++i)
+    best = outer(best, inner(inner(four[i], four[(i + 2) % 8]), outer(p[2 * i - 1], p[(2 * i + 8) % 16])));
+  return best;
+}
+
+/// For n pixels from `centre` on: by how much the darkest pixel of the best bright arc exceeds the centre, or the
+/// brightest of the best dark arc falls below it, whichever is more. A corner at threshold t has more than t.
 void score_row(const Pixel* centre, std::ptrdiff_t stride, int n, Pixel* __restrict score) {
   const Pixel *u3 = centre - 3 * stride, *u2 = centre - 2 * stride, *u1 = centre - stride;
   const Pixel *d3 = centre + 3 * stride, *d2 = centre + 2 * stride, *d1 = centre + stride;
@@ -31,34 +50,9 @@ void score_row(const Pixel* centre, std::ptrdiff_t stride, int n, Pixel* __restr
     const int end = first + size;
 #pragma GCC ivdep
     for (int x = first; x < end; ++x) {
-      const Pixel p0 = u3[x], p1 = u3[x + 1], p2 = u2[x + 2], p3 = u1[x + 3], p4 = centre[x + 3], p5 = d1[x + 3],
-                  p6 = d2[x + 2], p7 = d3[x + 1], p8 = d3[x], p9 = d3[x - 1], p10 = d2[x - 2], p11 = d1[x - 3],
-                  p12 = centre[x - 3], p13 = u1[x - 3], p14 = u2[x - 2], p15 = u3[x - 1];
-      const Pixel a0 = lower(p0, p1), a2 = lower(p2, p3), a4 = lower(p4, p5), a6 = lower(p6, p7), a8 = lower(p8, p9),
-                  a10 = lower(p10, p11), a12 = lower(p12, p13), a14 = lower(p14, p15);
-      const Pixel b0 = lower(a0, a2), b2 = lower(a2, a4), b4 = lower(a4, a6), b6 = lower(a6, a8), b8 = lower(a8, a10),
-                  b10 = lower(a10, a12), b12 = lower(a12, a14), b14 = lower(a14, a0);
-      Pixel bright = lower(lower(b0, b4), upper(p15, p8));
-      bright = upper(bright, lower(lower(b2, b6), upper(p1, p10)));
-      bright = upper(bright, lower(lower(b4, b8), upper(p3, p12)));
-      bright = upper(bright, lower(lower(b6, b10), upper(p5, p14)));
-      bright = upper(bright, lower(lower(b8, b12), upper(p7, p0)));
-      bright = upper(bright, lower(lower(b10, b14), upper(p9, p2)));
-      bright = upper(bright, lower(lower(b12, b0), upper(p11, p4)));
-      bright = upper(bright, lower(lower(b14, b2), upper(p13, p6)));
-
-      const Pixel c0 = upper(p0, p1), c2 = upper(p2, p3), c4 = upper(p4, p5), c6 = upper(p6, p7), c8 = upper(p8, p9),
-                  c10 = upper(p10, p11), c12 = upper(p12, p13), c14 = upper(p14, p15);
-      const Pixel e0 = upper(c0, c2), e2 = upper(c2, c4), e4 = upper(c4, c6), e6 = upper(c6, c8), e8 = upper(c8, c10),
-                  e10 = upper(c10, c12), e12 = upper(c12, c14), e14 = upper(c14, c0);
-      Pixel dark = upper(upper(e0, e4), lower(p15, p8));
-      dark = lower(dark, upper(upper(e2, e6), lower(p1, p10)));
-      dark = lower(dark, upper(upper(e4, e8), lower(p3, p12)));
-      dark = lower(dark, upper(upper(e6, e10), lower(p5, p14)));
-      dark = lower(dark, upper(upper(e8, e12), lower(p7, p0)));
-      dark = lower(dark, upper(upper(e10, e14), lower(p9, p2)));
-      dark = lower(dark, upper(upper(e12, e0), lower(p11, p4)));
-      dark = lower(dark, upper(upper(e14, e2), lower(p13, p6)));
+      const Circle circle{u3[x], u3[x + 1], u2[x + 2], u1[x + 3], centre[x + 3], d1[x + 3], d2[x + 2], d3[x + 1],
+                          d3[x], d3[x - 1], d2[x - 2], d1[x - 3], centre[x - 3], u1[x - 3], u2[x - 2], u3[x - 1]};
+      const Pixel bright = best_arc(circle, lower, upper), dark = best_arc(circle, upper, lower);
       score[x] = upper(excess(bright, centre[x]), excess(centre[x], dark));
     }
   });
