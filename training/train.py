@@ -21,6 +21,8 @@ def arguments():
     a = argparse.ArgumentParser(description=__doc__)
     a.add_argument("--train", required=True, help="COCO JSON")
     a.add_argument("--images", required=True, help="folder that the JSON's file names are relative to")
+    a.add_argument("--also", nargs=3, action="append", default=[], metavar=("JSON", "IMAGES", "SHARE"),
+                   help="more data of the same classes, and the share of all pictures that is to come from it")
     a.add_argument("--out", required=True, help="folder for check points and the log; an old check point there is continued")
     a.add_argument("--backbone", default="mobilenet_v2")
     a.add_argument("--start", help="start weights of the backbone (.npz by torchvision's layer names)")
@@ -58,7 +60,7 @@ def main():
         end = now.replace(hour=h, minute=m, second=0).timestamp()
         if end < now.timestamp():
             end += 86400
-    data = dataset.Batches(o.train, o.images, [o.seed, state["step"] if state else 0], begin, end)
+    data = dataset.Batches([(o.train, o.images, None)] + o.also, [o.seed, state["step"] if state else 0], begin, end)
     rank = 0
     while rank + 1 < o.processes and os.fork() == 0:       # forked after loading: the pictures are shared
         rank += 1

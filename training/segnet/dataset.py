@@ -31,22 +31,32 @@ def load(json_path):
 class Batches(torch.utils.data.IterableDataset):
     """Endless batches: pictures [B,3,H,W] uint8 RGB and per picture a dict of boxes, labels, masks, ignored boxes and mask."""
 
-    def __init__(self, json_path, image_dir, seed, begin, end, canvases=((256, 352, 3), (320, 416, 2), (384, 512, 2))):
-        self.names, self.images, self.anns = load(json_path)
+    def __init__(self, sources, seed, begin, end, canvases=((256, 352, 3), (320, 416, 2), (384, 512, 2))):
+        """sources: (COCO JSON, folder of its pictures, share of all pictures drawn; None = what the others leave)."""
         self.seed, self.begin, self.end, self.canvases = seed, begin, end, canvases
-        self.pixels = []
-        for im in self.images:
-            p = cv2.imread(os.path.join(image_dir, im["file_name"]), cv2.IMREAD_COLOR)
-            if p is None:
-                raise FileNotFoundError(os.path.join(image_dir, im["file_name"]))
-            self.pixels.append(np.ascontiguousarray(p[:, :, ::-1]))
-        self.labels = [self.anns.get(im["id"], []) for im in self.images]
+        self.names, self.pixels, self.labels, source = None, [], [], []
+        for n, (json_path, image_dir, _) in enumerate(sources):
+            names, images, anns = load(json_path)
+            if self.names not in (None, names):
+                raise ValueError(f"{json_path}: has other classes than {sources[0][0]}")
+            self.names = names
+            for im in images:
+                p = cv2.imread(os.path.join(image_dir, im["file_name"]), cv2.IMREAD_COLOR)
+                if p is None:
+                    raise FileNotFoundError(os.path.join(image_dir, im["file_name"]))
+                self.pixels.append(np.ascontiguousarray(p[:, :, ::-1]))
+                self.labels.append(anns.get(im["id"], []))
+                source.append(n)
         self.bodies = [(i, k) for i, anns in enumerate(self.labels) for k, (c, crowd, pol) in enumerate(anns)
                        if c == 1 and not crowd and np.ptp(np.concatenate(pol), 0).min() > 40]
         with_person = np.array([any(c == 1 and not crowd for c, crowd, _ in a) for a in self.labels])
         rare = np.array([any(c != 1 and not crowd for c, crowd, _ in a) for a in self.labels])
         weight = np.where(with_person, 1.0, 0.7) + 0.3 * rare
-        self.weight = weight / weight.sum()
+        rest = 1 - sum(float(share) for *_, share in sources if share is not None)
+        for n, (*_, share) in enumerate(sources):
+            own = np.array(source) == n
+            weight[own] *= (rest if share is None else float(share)) / weight[own].sum()
+        self.weight = weight
 
     def place(self, rng, i, canvas, out, region, objects):
         """Warps picture i into `region` (y0 x0 y1 x1) of `out` and adds its objects."""
