@@ -6,9 +6,10 @@
 namespace semvslam {
 namespace {
 
-constexpr int kGrid = 4;         // px: overlaps are counted on every 4th pixel of every 4th row
-constexpr double kMerged = 0.5;  // share of a carried mask that others cover when it is no object of its own
-constexpr int kGapPx = 5;        // two outlines of one object differ by up to this
+constexpr int kGrid = 4;                // px: overlaps are counted on every 4th pixel of every 4th row
+constexpr double kMerged = 0.5;         // share of a carried mask that others cover when it is no object of its own
+constexpr double kLeastMeasured = 0.5;  // share of a lost part that must have depth: without, nothing speaks for it
+constexpr int kGapPx = 5;               // two outlines of one object differ by up to this
 
 /// Pixels on the grid of masks, one of them moved, and in both.
 struct Overlap {
@@ -94,6 +95,19 @@ int keep_large(cv::Mat& mask, int least_px) {
   return left;
 }
 
+/// Share of the pixels of a mask at which the present depth is measured; 1 without depth images.
+double measured_share(const cv::Rect& window, const cv::Mat& mask, const cv::Mat& half_depth) {
+  if (half_depth.empty()) return 1;
+  int n = 0, measured = 0;
+  for (int y = (window.y + 1) / 2 * 2; y < window.y + window.height; y += 2)
+    for (int x = (window.x + 1) / 2 * 2; x < window.x + window.width; x += 2) {
+      if (mask.at<std::uint8_t>(y - window.y, x - window.x) == 0) continue;
+      ++n;
+      measured += half_depth.at<float>(y / 2, x / 2) > 0;
+    }
+  return n > 0 ? static_cast<double>(measured) / n : 0;
+}
+
 }  // namespace
 
 void InstanceMemoryOptions::add_to(ConfigSchema& schema) {
@@ -112,10 +126,7 @@ InstanceMemory::InstanceMemory(const Camera& camera, const MaskCarryOptions& car
                                const InstanceMemoryOptions& options)
     : carry_(camera, carry), options_(options) {}
 
-void InstanceMemory::reset() {
-  tracks_.clear();
-  previous_ = CarryFrame();
-}
+void InstanceMemory::reset() { tracks_.clear(); }
 
 struct InstanceMemory::Step {
   const CarryFrame& present;
@@ -134,6 +145,10 @@ MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional
   Step step{present, cur_from_prev, lacking, segmentation, segmentation.instances.size(), {}, {}, {}};
   step.track_of.assign(step.segmented, Step::kNone);
   step.found.assign(tracks_.size(), false);
+  for (Track& t : tracks_)
+    t.present_from_whole = t.present_from_whole && cur_from_prev
+                               ? std::optional<SE3>(*cur_from_prev * *t.present_from_whole)
+                               : std::nullopt;
   match(step);
   for (std::size_t i = 0; i < step.segmented; ++i)
     if (step.track_of[i] != Step::kNone) follow(step, tracks_[step.track_of[i]], segmentation.instances[i]);
@@ -146,13 +161,11 @@ MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional
     now.track = TrackId(next_track_++);
     Track fresh;
     fresh.id = now.track;
-    fresh.last = now;
-    fresh.pixels = cv::countNonZero(now.mask);
     fresh.confirmed = 1;
+    renew(step, fresh, now, cv::countNonZero(now.mask));
     kept.push_back(std::move(fresh));
   }
   tracks_ = std::move(kept);
-  previous_ = present;
   return step.report;
 }
 
@@ -167,7 +180,7 @@ void InstanceMemory::match(Step& step) {
       const Instance &before = tracks_[t].last, &now = step.segmentation.instances[i];
       if (now.role != Role::kDynamic || now.class_name != before.class_name) continue;
       const double iou =
-          overlap(before.window, before.mask, cv::Point(tracks_[t].shift_px), now.window, now.mask).iou();
+          overlap(before.window, before.mask, cv::Point(tracks_[t].velocity_px), now.window, now.mask).iou();
       if (iou >= options_.least_overlap) candidates.push_back({iou, t, i});
     }
   std::stable_sort(candidates.begin(), candidates.end(),
@@ -181,7 +194,7 @@ void InstanceMemory::match(Step& step) {
 
 void InstanceMemory::follow(Step& step, Track& track, Instance& now) {
   const int segmented_px = cv::countNonZero(now.mask);
-  const bool shrunk = segmented_px < (1 - options_.limb_trigger) * track.pixels;
+  const bool shrunk = segmented_px < (1 - options_.limb_trigger) * track.whole_px;
   const cv::Point2f moved = centre(now) - centre(track.last);
   const bool extended = (shrunk || step.lacking) && track.confirmed >= options_.confirmations &&
                         track.extended < options_.longest_carry && extend(step, track, now);
@@ -189,22 +202,41 @@ void InstanceMemory::follow(Step& step, Track& track, Instance& now) {
   track.carried = 0;
   ++track.confirmed;
   now.track = track.id;
+  if (!extended) {
+    renew(step, track, now, segmented_px);
+    track.velocity_px = moved;
+  }
   track.last = now;
-  track.pixels = extended ? cv::countNonZero(now.mask) : segmented_px;
-  if (!extended && !shrunk) track.shift_px = moved;
+}
+
+void InstanceMemory::renew(const Step& step, Track& track, const Instance& now, int pixels) {
+  track.last = now;
+  track.whole = now;
+  track.whole_images = step.present;
+  track.whole_px = pixels;
+  track.present_from_whole = SE3();
+  track.shift_px = {};
+}
+
+CarriedMask InstanceMemory::carry_whole(const Step& step, Track& track) const {
+  CarriedMask out = carry_.carry(track.whole_images, step.present, track.whole.window, track.whole.mask,
+                                 track.present_from_whole, track.shift_px + track.velocity_px);
+  if (out.flow_points > 0) track.velocity_px = out.shift_px - track.shift_px;
+  track.shift_px = out.shift_px;
+  return out;
 }
 
 bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
-  const CarriedMask carried =
-      carry_.carry(previous_, step.present, track.last.window, track.last.mask, step.cur_from_prev, track.shift_px);
+  const CarriedMask carried = carry_whole(step, track);
   if (carried.outcome != CarryOutcome::kVisible) return false;
   cv::Mat missing = carried.mask.clone();
   for (std::size_t i = 0; i < step.segmented; ++i)
     if (step.segmentation.instances[i].role == Role::kDynamic)
       subtract(carried.window, missing, step.segmentation.instances[i], kGapPx);
   cv::morphologyEx(missing, missing, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 5)));
-  const int least = std::max(options_.least_px / 2, static_cast<int>(options_.least_limb * track.pixels));
+  const int least = std::max(options_.least_px / 2, static_cast<int>(options_.least_limb * track.whole_px));
   if (keep_large(missing, least) == 0) return false;
+  if (measured_share(carried.window, missing, step.present.half_depth_m()) < kLeastMeasured) return false;
   // Back to where the segmented part ends.
   cv::dilate(missing, missing, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kGapPx + 1, 2 * kGapPx + 1)));
   cv::bitwise_and(missing, carried.mask, missing);
@@ -220,14 +252,12 @@ bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
   const cv::Rect set = cv::boundingRect(mask);
   place(set + united.tl(), mask(set), now);
   now.provenance = Provenance::kExtended;
-  track.shift_px = carried.shift_px;
   return true;
 }
 
 bool InstanceMemory::restore(Step& step, Track& track) {
   if (track.confirmed < options_.confirmations || track.carried >= options_.longest_carry) return false;
-  CarriedMask carried =
-      carry_.carry(previous_, step.present, track.last.window, track.last.mask, step.cur_from_prev, track.shift_px);
+  CarriedMask carried = carry_whole(step, track);
   if (carried.outcome != CarryOutcome::kVisible) return false;
   const int carried_px = cv::countNonZero(carried.mask);
   int left = carried_px;
@@ -245,8 +275,6 @@ bool InstanceMemory::restore(Step& step, Track& track) {
   now.provenance = Provenance::kRestored;
   now.track = track.id;
   track.last = now;
-  track.pixels = left;
-  track.shift_px = carried.shift_px;
   ++track.carried;
   track.extended = 0;
   ++step.report.restored_instances;

@@ -44,22 +44,26 @@ class InstanceMemory {
  private:
   struct Track {
     TrackId id;
-    Instance last;         // in the frame before
-    int pixels = 0;        // of it
-    cv::Point2f shift_px;  // motion per frame; zero = unknown
-    int confirmed = 0;     // frames in which it was segmented
-    int carried = 0;       // frames in a row without
-    int extended = 0;      // frames in a row with a part put back
+    Instance last;   // in the frame before
+    Instance whole;  // as last segmented without loss: what is carried, so that errors do not add up
+    CarryFrame whole_images;
+    int whole_px = 0;
+    std::optional<SE3> present_from_whole;  // camera motion since then; none = unknown
+    cv::Point2f shift_px, velocity_px;      // motion since then, motion per frame
+    int confirmed = 0;                      // frames in which it was segmented
+    int carried = 0;                        // frames in a row without
+    int extended = 0;                       // frames in a row with a part put back
   };
   struct Step;  // what belongs to one call of step()
   void match(Step& step);
   void follow(Step& step, Track& track, Instance& now);
   bool extend(Step& step, Track& track, Instance& now);
+  CarriedMask carry_whole(const Step& step, Track& track) const;
+  static void renew(const Step& step, Track& track, const Instance& now, int pixels);
   bool restore(Step& step, Track& track);
 
   MaskCarry carry_;
   InstanceMemoryOptions options_;
-  CarryFrame previous_;
   std::vector<Track> tracks_;
   std::uint32_t next_track_ = 0;
 };
