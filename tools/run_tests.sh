@@ -1,8 +1,13 @@
 # Sourced by ./semvslam. Runs all tests and ends with one line "N passed, N failed, N skipped"; the exit code is 0 only when
 # nothing failed.
-#   run_tests [--filter REGEX] [--full]
-# --filter: only the tests whose name matches. --full: also clang-tidy, the sanitizers and the fuzz targets.
+#   run_tests [--filter REGEX] [--with STAGE,...] [--full]
+# --filter: only the tests whose name matches. --with: more stages after them; --full: all of these:
+#   tidy     clang-tidy: headers and the source files changed last
+#   threads  thread sanitizer: queues, prefetching and the threaded pipeline
+#   fuzz     libFuzzer targets of every parser, SEMVSLAM_FUZZ_SECONDS each (60), with address sanitizer
+#   memory   address and undefined-behaviour sanitizers: the tests of all modules (builds everything once more)
 
+all_stages=(tidy threads fuzz memory)
 passed=0 failed=0 skipped=0
 failures=()
 
@@ -57,53 +62,68 @@ ensure_evo() {
   if [ -x "$environment/bin/python" ]; then export SEMVSLAM_EVO_PYTHON=$environment/bin/python; fi
 }
 
-# sanitized PRESET CTEST_REGEX MODULE...: builds the tests of some modules with a sanitizer and runs those that match.
+# sanitized PRESET CTEST_REGEX [MODULE...]: builds the tests of some modules, or of all, with a sanitizer and runs those
+# that match.
 sanitized() {
-  local preset=$1 regex=$2 folder=$root/build/$1 known module targets=()
+  local preset=$1 regex=$2 folder=$root/build/$1 known targets
   shift 2
   configure "$folder" "$preset"
-  known=$(ninja -C "$folder" -t targets all)
-  for module in "$@"; do
-    if grep -q "^${module}_test: " <<< "$known"; then targets+=("${module}_test"); fi
-  done
+  known=$(IFS='|'; echo "${*:-[a-z]+}")
+  mapfile -t targets < <(ninja -C "$folder" -t targets all | sed -nE "s/^(($known)_test): .*/\\1/p")
   if ! (compile "$folder" "${targets[@]}"); then
     count_step "build $preset" 1
     return
   fi
-  run_ctest "$folder" -R "$regex"
+  run_ctest "$folder" -R "$regex" -E '^house\.'
 }
 
-run_full() {
-  say "clang-tidy"
+run_stage() {
   local code=0
-  python3 "$root/tools/run_tidy.py" "$build" || code=$?
-  count_step clang-tidy $code
-  say "address and undefined-behaviour sanitizers"
-  sanitized asan '^(base|geometry|data|feature|map|eval)\.' base geometry data feature map eval
-  say "thread sanitizer"
-  sanitized tsan '^(base|pipeline)\.|Prefetch' base data pipeline
-  if [ -e "$root/fuzz/CMakeLists.txt" ]; then
-    say "fuzz targets, ${SEMVSLAM_FUZZ_SECONDS:-60} s each"
-    configure "$root/build/fuzz" fuzz -DSEMVSLAM_FUZZ_SECONDS="${SEMVSLAM_FUZZ_SECONDS:-60}"
-    if (compile "$root/build/fuzz" all); then
-      run_ctest "$root/build/fuzz" -L fuzz
-    else
-      count_step "build fuzz" 1
-    fi
-  fi
+  case $1 in
+    tidy)
+      say "clang-tidy"
+      python3 "$root/tools/run_tidy.py" "$build" || code=$?
+      count_step clang-tidy $code
+      ;;
+    threads)
+      say "thread sanitizer"
+      sanitized tsan '^(base|pipeline)\.|Prefetch' base data pipeline
+      ;;
+    fuzz)
+      say "fuzz targets, ${SEMVSLAM_FUZZ_SECONDS:-60} s each"
+      configure "$root/build/fuzz" fuzz -DSEMVSLAM_FUZZ_SECONDS="${SEMVSLAM_FUZZ_SECONDS:-60}"
+      if (compile "$root/build/fuzz" all); then
+        run_ctest "$root/build/fuzz" -L fuzz
+      else
+        count_step "build fuzz" 1
+      fi
+      ;;
+    memory)
+      say "address and undefined-behaviour sanitizers"
+      sanitized asan '^[a-z]+\.'
+      ;;
+  esac
 }
 
 run_tests() {
-  local full=false filter=()
+  local stages=() stage filter=()
   while [ $# -gt 0 ]; do
     case $1 in
-      --full) full=true ;;
+      --full) stages=("${all_stages[@]}") ;;
+      --with)
+        [ $# -ge 2 ] || fail "--with needs stages, separated by commas: ${all_stages[*]}"
+        IFS=, read -r -a stages <<< "$2"
+        for stage in "${stages[@]}"; do
+          [[ " ${all_stages[*]} " == *" $stage "* ]] || fail "unknown stage: $stage (known: ${all_stages[*]})"
+        done
+        shift
+        ;;
       --filter)
         [ $# -ge 2 ] || fail "--filter needs a regular expression"
         filter=(-R "$2")
         shift
         ;;
-      *) fail "unknown option of test: $1 (known: --filter REGEX, --full)" ;;
+      *) fail "unknown option of test: $1 (known: --filter REGEX, --with STAGE,..., --full)" ;;
     esac
     shift
   done
@@ -112,7 +132,7 @@ run_tests() {
   compile "$build" all
   say "tests"
   run_ctest "$build" "${filter[@]}"
-  if $full && [ "${#filter[@]}" -eq 0 ]; then run_full; fi
+  for stage in "${stages[@]}"; do run_stage "$stage"; done
 
   if [ "${#failures[@]}" -gt 0 ]; then printf 'failed: %s\n' "${failures[@]}"; fi
   local line="$passed passed, $failed failed"
