@@ -1,15 +1,17 @@
 #include "semvslam/semantic/instance_memory.h"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 namespace semvslam {
 namespace {
 
-constexpr int kGrid = 4;                // px: overlaps are counted on every 4th pixel of every 4th row
-constexpr double kMerged = 0.5;         // share of a carried mask that others cover when it is no object of its own
-constexpr double kLeastMeasured = 0.5;  // share of a lost part that must have depth: without, nothing speaks for it
-constexpr int kGapPx = 5;               // two outlines of one object differ by up to this
+constexpr int kGrid = 4;                  // px: overlaps are counted on every 4th pixel of every 4th row
+constexpr double kMerged = 0.5;           // share of a carried mask that others cover when it is no object of its own
+constexpr double kLeastMeasured = 0.5;    // share of a lost part that must have depth: without, nothing speaks for it
+constexpr double kLeastAgreement = 0.85;  // share of the segmented rest that the carried mask must cover
+constexpr int kGapPx = 5;                 // two outlines of one object differ by up to this
 
 /// Pixels on the grid of masks, one of them moved, and in both.
 struct Overlap {
@@ -76,36 +78,59 @@ int subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int m
   return cv::countNonZero(mask);
 }
 
-/// Keeps the connected parts that are large enough. @return pixels left
-int keep_large(cv::Mat& mask, int least_px) {
-  cv::Mat labels, stats, centroids;
-  const int n = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 8, CV_32S);
-  std::vector<std::uint8_t> keep(static_cast<std::size_t>(n), 0);
-  int left = 0;
-  for (int i = 1; i < n; ++i)
-    if (const int area = stats.at<int>(i, cv::CC_STAT_AREA); area >= least_px) {
-      keep[static_cast<std::size_t>(i)] = 255;
-      left += area;
-    }
-  for (int y = 0; y < mask.rows; ++y) {
-    const int* label = labels.ptr<int>(y);
-    std::uint8_t* row = mask.ptr<std::uint8_t>(y);
-    for (int x = 0; x < mask.cols; ++x) row[x] = keep[static_cast<std::size_t>(label[x])];
-  }
-  return left;
-}
-
-/// Share of the pixels of a mask at which the present depth is measured; 1 without depth images.
-double measured_share(const cv::Rect& window, const cv::Mat& mask, const cv::Mat& half_depth) {
-  if (half_depth.empty()) return 1;
-  int n = 0, measured = 0;
+float median_depth_m(const cv::Rect& window, const cv::Mat& mask, const cv::Mat& half_depth, double& measured_share) {
+  std::vector<float> depths;
+  int n = 0;
   for (int y = (window.y + 1) / 2 * 2; y < window.y + window.height; y += 2)
     for (int x = (window.x + 1) / 2 * 2; x < window.x + window.width; x += 2) {
       if (mask.at<std::uint8_t>(y - window.y, x - window.x) == 0) continue;
       ++n;
-      measured += half_depth.at<float>(y / 2, x / 2) > 0;
+      if (const float d = half_depth.at<float>(y / 2, x / 2); d > 0) depths.push_back(d);
     }
-  return n > 0 ? static_cast<double>(measured) / n : 0;
+  measured_share = n > 0 ? static_cast<double>(depths.size()) / n : 0;
+  if (depths.empty()) return 0;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+/// A lost part is measured, touches what is left of the object, and goes on at the depth it has there.
+bool belongs(const cv::Rect& window, const cv::Mat& part, const Instance& rest, const cv::Mat& half_depth) {
+  cv::Mat around, touching = cv::Mat::zeros(window.size(), CV_8UC1);
+  constexpr int kReach = 2 * kGapPx + 2;
+  cv::dilate(part, around, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kReach + 1, 2 * kReach + 1)));
+  if (const cv::Rect both = window & rest.window; !both.empty())
+    rest.mask(both - rest.window.tl()).copyTo(touching(both - window.tl()));
+  cv::bitwise_and(touching, around, touching);
+  if (cv::countNonZero(touching) < 4 * kGapPx) return false;
+  if (half_depth.empty()) return true;
+  // The rim of the part on the side of the rest, not its middle: an arm may reach far forward.
+  cv::Mat rim;
+  cv::dilate(touching, rim, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kReach + 1, 2 * kReach + 1)));
+  cv::bitwise_and(rim, part, rim);
+  double measured = 0, unused = 0;
+  median_depth_m(window, part, half_depth, measured);
+  const float there = median_depth_m(window, touching, half_depth, unused),
+              here = median_depth_m(window, rim, half_depth, unused);
+  constexpr float kStepM = 0.12f;
+  return measured >= kLeastMeasured && here > 0 && there > 0 && std::abs(here - there) < kStepM;
+}
+
+/// Keeps the connected parts of a mask that are large enough and belong to an object. @return whether any is left
+bool keep_lost_parts(const cv::Rect& window, cv::Mat& mask, const Instance& rest, const cv::Mat& half_depth,
+                     int least_px) {
+  cv::Mat labels, stats, centroids;
+  const int n = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 8, CV_32S);
+  mask.setTo(0);
+  bool any = false;
+  for (int i = 1; i < n; ++i) {
+    if (stats.at<int>(i, cv::CC_STAT_AREA) < least_px) continue;
+    const cv::Mat part = labels == i;
+    if (!belongs(window, part, rest, half_depth)) continue;
+    mask.setTo(255, part);
+    any = true;
+  }
+  return any;
 }
 
 }  // namespace
@@ -229,14 +254,16 @@ CarriedMask InstanceMemory::carry_whole(const Step& step, Track& track) const {
 bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
   const CarriedMask carried = carry_whole(step, track);
   if (carried.outcome != CarryOutcome::kVisible) return false;
+  // What is still segmented shows whether the mask came to the right place.
+  const Overlap agreement = overlap(carried.window, carried.mask, {}, now.window, now.mask);
+  if (agreement.both < kLeastAgreement * agreement.second) return false;
   cv::Mat missing = carried.mask.clone();
   for (std::size_t i = 0; i < step.segmented; ++i)
     if (step.segmentation.instances[i].role == Role::kDynamic)
       subtract(carried.window, missing, step.segmentation.instances[i], kGapPx);
   cv::morphologyEx(missing, missing, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 5)));
   const int least = std::max(options_.least_px / 2, static_cast<int>(options_.least_limb * track.whole_px));
-  if (keep_large(missing, least) == 0) return false;
-  if (measured_share(carried.window, missing, step.present.half_depth_m()) < kLeastMeasured) return false;
+  if (!keep_lost_parts(carried.window, missing, now, step.present.half_depth_m(), least)) return false;
   // Back to where the segmented part ends.
   cv::dilate(missing, missing, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kGapPx + 1, 2 * kGapPx + 1)));
   cv::bitwise_and(missing, carried.mask, missing);

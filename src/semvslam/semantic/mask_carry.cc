@@ -13,7 +13,14 @@ namespace semvslam {
 namespace {
 
 /// What the present depth says about a pixel that the mask was carried to.
-enum Verdict : std::uint8_t { kOutside, kKept, kKeptUnmeasured, kNearer, kFarther };
+enum Verdict : std::uint8_t {
+  kOutside,
+  kKept,
+  kKeptUnmeasured,  // no depth now, nor before
+  kUnmeasured,      // no depth now, but before: kept only beside kept ones
+  kNearer,
+  kFarther
+};
 
 struct DepthRange {
   float low_m = 0, high_m = 0;
@@ -51,12 +58,11 @@ struct DepthCheck {
   DepthRange range;  // already moved by change_m
 
   Verdict operator()(float now, float before) const {
-    if (!(now > 0)) return kKeptUnmeasured;
+    if (!(now > 0)) return before > 0 ? kUnmeasured : kKeptUnmeasured;
     if (before > 0) {
       const float off = now - before - change_m;
       if (std::abs(off) <= tolerance_m) return kKept;
-      if (off > 0) return kFarther;
-      return range.known && now >= range.low_m ? kKept : kNearer;  // another part of the object came in front
+      return off > 0 ? kFarther : kNearer;
     }
     if (!range.known) return kKeptUnmeasured;
     if (now < range.low_m - tolerance_m) return kNearer;
@@ -91,7 +97,7 @@ Warped warp(const HalfMask& object, const MaskMotion& motion, const cv::Mat& bef
           depth ? check(now_row[x], before.at<float>(object.window.y + sy, object.window.x + sx)) : kKeptUnmeasured;
       verdicts[x] = v;
       out.kept += v == kKept;
-      out.unmeasured += v == kKeptUnmeasured;
+      out.unmeasured += v == kKeptUnmeasured || v == kUnmeasured;
       out.nearer += v == kNearer;
       out.farther += v == kFarther;
     }
@@ -123,7 +129,7 @@ void grow(cv::Mat& verdicts, const cv::Mat& now, const cv::Point& origin, const 
         const cv::Point q = p + cv::Point(dx, dy);
         if (!area.contains(q)) continue;
         std::uint8_t& verdict = verdicts.at<std::uint8_t>(q);
-        if (verdict == kKept || verdict == kKeptUnmeasured) continue;
+        if (verdict == kKept) continue;
         const float there = now.at<float>(q + origin);
         if (!(there > 0) || std::abs(there - here) > kStepM * std::max(1.f, here / 2)) continue;
         if (there < check.range.low_m - check.tolerance_m / 2 || there > check.range.high_m + check.tolerance_m / 2)
@@ -134,6 +140,19 @@ void grow(cv::Mat& verdicts, const cv::Mat& now, const cv::Point& origin, const 
     }
     std::swap(front, next);
   }
+}
+
+/// 255 where a pixel is kept: with fitting depth, without depth now and before, or without depth near fitting ones.
+cv::Mat kept_mask(const cv::Mat& verdicts) {
+  constexpr int kNear = 6;  // half px
+  cv::Mat fitting, out, unmeasured;
+  cv::inRange(verdicts, kKept, kKept, fitting);
+  cv::inRange(verdicts, kKept, kKeptUnmeasured, out);
+  cv::inRange(verdicts, kUnmeasured, kUnmeasured, unmeasured);
+  cv::dilate(fitting, fitting, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kNear + 1, 2 * kNear + 1)));
+  out |= fitting & unmeasured;
+  cv::medianBlur(out, out, 3);
+  return out;
 }
 
 /// The half-size mask in full size, cut to what is set.
@@ -252,10 +271,7 @@ CarriedMask MaskCarry::carry(const CarryFrame& from, const CarryFrame& to, const
     return out;
   }
   if (check.range.known && !now.empty()) grow(warped.verdicts, now, motion.window.tl(), check, options_.grow_px / 2);
-  cv::Mat kept;
-  cv::inRange(warped.verdicts, kKept, kKeptUnmeasured, kept);
-  cv::medianBlur(kept, kept, 3);
-  finish(kept, motion.window, cv::Size(camera_.width_px, camera_.height_px), out);
+  finish(kept_mask(warped.verdicts), motion.window, cv::Size(camera_.width_px, camera_.height_px), out);
   out.outcome = out.window.empty() ? CarryOutcome::kGone : CarryOutcome::kVisible;
   return out;
 }

@@ -16,7 +16,7 @@ struct MaskCarryOptions {
   std::string motion = "flow";     // flow (LK inside the mask, started with the pose), pose (pose and depth), none
   int points = 80;                 // LK points per instance
   double depth_tolerance_m = 0.2;  // how far a pixel's depth may be from the one carried to it
-  int grow_px = 8;                 // how far connected pixels of fitting depth are taken in
+  int grow_px = 4;                 // how far connected pixels of fitting depth are taken in
   double least_support = 0.4;      // share of the carried pixels that must fit the present depth, else it is not there
   double least_inside = 0.15;      // share of the carried pixels that must lie in the image, else it has left
 
