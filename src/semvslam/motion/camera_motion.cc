@@ -15,9 +15,9 @@ using Vector6 = SE3::Tangent;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kSampleSize = 3;
-constexpr double kNearestM = 0.05;  // points nearer to the camera's plane are not projected
-constexpr double kDepthSigmas = 4;  // within which the measured depth must agree
-constexpr double kHintShare = 0.5;  // a motion that the hint speaks against needs 1 / this as much support
+constexpr double kNearestPointM = 0.05;  // points nearer to the camera's plane are not projected
+constexpr double kDepthSigmas = 4;       // within which the measured depth must agree
+constexpr double kHintShare = 0.5;       // a motion that the hint speaks against needs 1 / this as much support
 
 struct Ready {  // a pair that can vote
   Eigen::Vector3d point;
@@ -93,7 +93,7 @@ class Estimator {
   // 0 = does not agree, 1 = fits exactly.
   double agreement(const SE3& motion, const Eigen::Matrix3d& rotation, const Ready& pair) const {
     const Eigen::Vector3d p = rotation * pair.point + motion.translation();
-    if (p.z() < kNearestM) return 0;
+    if (p.z() < kNearestPointM) return 0;
     const double limit = options_.inlier_px * options_.inlier_px;
     const double squared = (camera_.project(p) - pair.to_px).squaredNorm();
     if (squared > limit) return 0;
@@ -137,7 +137,7 @@ class Estimator {
     for (const auto i : indices) {
       const Ready& pair = ready_[static_cast<std::size_t>(i)];
       const Eigen::Vector3d p = motion * pair.point;
-      if (p.z() < kNearestM) return false;
+      if (p.z() < kNearestPointM) return false;
       const double iz = 1 / p.z(), x = p.x() * iz, y = p.y() * iz, fx = camera_.fx_px, fy = camera_.fy_px;
       const Eigen::Vector2d error = pair.to_px - camera_.project(p);
       Vector6 jx, jy;
@@ -210,7 +210,7 @@ class Estimator {
       for (const int cell : used_cells_) {
         const Ready& pair = ready_[static_cast<std::size_t>(cells_[static_cast<std::size_t>(cell)].front())];
         const Eigen::Vector3d p = chosen * pair.point, q = other.motion * pair.point;
-        if (p.z() < kNearestM || q.z() < kNearestM) continue;
+        if (p.z() < kNearestPointM || q.z() < kNearestPointM) continue;
         ++asked;
         apart += (camera_.project(p) - camera_.project(q)).norm() > 2 * options_.inlier_px;
       }

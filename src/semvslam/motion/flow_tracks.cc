@@ -70,12 +70,11 @@ double patch_difference(const cv::Mat& a, const cv::Point2f& at_a, const cv::Mat
   return sum / kCount;
 }
 
-// How far the depths two pixels away lie off a straight surface, the largest of four directions.
-float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, float centre_m) {
-  constexpr int kReachPx = 2;
-  if (x < kReachPx || y < kReachPx || x >= depth.cols - kReachPx || y >= depth.rows - kReachPx) return 0;
+// How far the depths around a place lie off a straight surface, the largest of four directions.
+float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, int reach_px, float centre_m) {
+  if (x < reach_px || y < reach_px || x >= depth.cols - reach_px || y >= depth.rows - reach_px) return 0;
   float bend = 0;
-  for (const auto& [dx, dy] : {std::pair{2, 0}, {0, 2}, {2, 2}, {2, -2}}) {
+  for (const auto& [dx, dy] : {std::pair{reach_px, 0}, {0, reach_px}, {reach_px, reach_px}, {reach_px, -reach_px}}) {
     const float a = motion_depth_m(depth, metres_per_unit, x + dx, y + dy);
     const float b = motion_depth_m(depth, metres_per_unit, x - dx, y - dy);
     if (a > 0 && b > 0)
@@ -84,6 +83,26 @@ float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, fl
       bend = std::max(bend, std::abs(std::max(a, b) - centre_m));
   }
   return bend;
+}
+
+// Mean products of the grey value's derivatives over the patch: (xx, xy, yy).
+Eigen::Vector3f texture_of(const cv::Mat& derivatives, const Eigen::Vector2f& pixel) {
+  constexpr int kRadiusPx = 5;
+  constexpr float kScharr = 1.f / 32;  // sum of the filter's weights on one side
+  const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
+  int xx = 0, xy = 0, yy = 0;  // Scharr of 8 bits stays below 2^13: the sums of 121 squares need some of its bits shed
+  for (int v = y - kRadiusPx; v <= y + kRadiusPx; ++v) {
+    const short* row = derivatives.ptr<short>(v) + 2 * (x - kRadiusPx);
+    for (int k = 0; k <= 2 * kRadiusPx; ++k) {
+      const int gx = row[2 * k] >> 2, gy = row[2 * k + 1] >> 2;
+      xx += gx * gx;
+      xy += gx * gy;
+      yy += gy * gy;
+    }
+  }
+  constexpr int kCount = (2 * kRadiusPx + 1) * (2 * kRadiusPx + 1);
+  const float scale = 16 * kScharr * kScharr / kCount;
+  return {static_cast<float>(xx) * scale, static_cast<float>(xy) * scale, static_cast<float>(yy) * scale};
 }
 
 float median_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) {
@@ -254,11 +273,15 @@ TrackSample FlowTracks::make_sample(const MotionFrame& frame, const Eigen::Vecto
   sample.pixel = pixel;
   sample.ideal = camera_.undistort(pixel.cast<double>()).cast<float>();
   sample.excluded = inside_mask(frame.excluded, pixel);
+  sample.texture = texture_of(pyramid_[1], pixel);
   if (!frame.depth.empty()) {
     const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
     const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
     sample.depth_m = median_depth_m(frame.depth, unit, x, y);
-    if (sample.depth_m > 0) sample.depth_spread_m = depth_bend_m(frame.depth, unit, x, y, sample.depth_m);
+    if (sample.depth_m > 0)
+      sample.depth_spread_m =
+          std::max(depth_bend_m(frame.depth, unit, x, y, 2, sample.depth_m),
+                   depth_bend_m(frame.depth, unit, x, y, options_.window_px / 2 - 1, sample.depth_m));
   }
   return sample;
 }

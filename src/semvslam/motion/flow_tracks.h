@@ -23,7 +23,8 @@ struct TrackSample {
   Eigen::Vector2f ideal = Eigen::Vector2f::Zero();  // without lens distortion
   float depth_m = 0;                                // along z; 0 = not measured
   float depth_spread_m = 0;  // range of the depths around it beyond a slanted surface's: large at an edge of depth
-  bool excluded = false;     // lay inside MotionFrame::excluded
+  Eigen::Vector3f texture = Eigen::Vector3f::Zero();  // mean g g^T of the grey gradient around: xx, xy, yy
+  bool excluded = false;                              // lay inside MotionFrame::excluded
 };
 
 /// A point followed through the images. The history is a ring: sample(0) is the newest.

@@ -19,10 +19,11 @@ double depth_sigma_m(const MotionCheckOptions& options, const TrackSample& sampl
   return std::sqrt(noise * noise + bias * bias + edge * edge);
 }
 
-double distance_from_segment_px(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+// From `p` to the nearest place of the segment a-b.
+Eigen::Vector2d offset_from_segment_px(const Eigen::Vector2d& p, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector2d d = b - a;
   const double length = d.squaredNorm(), t = length > 0 ? std::clamp((p - a).dot(d) / length, 0.0, 1.0) : 0;
-  return (a + t * d - p).norm();
+  return p - (a + t * d);
 }
 
 }  // namespace
@@ -67,6 +68,9 @@ void MotionCheckOptions::add_to(ConfigSchema& schema) {
   schema.add("motion.epipolar_px", &epipolar_px, {0.1, 100.0},
              "distance from the epipolar line above which a point moves, px");
   schema.add("motion.pixel_sigma_px", &pixel_sigma_px, {0.05, 10.0}, "standard deviation of a tracked point, px");
+  schema.add("motion.slip_share", &slip_share, {0.0, 1.0},
+             "standard deviation by which a track slips, share of the way it went");
+  schema.add("motion.edge_slip_share", &edge_slip_share, {0.0, 1.0}, "the same where two depths meet");
   schema.add("motion.depth_sigma_per_m2", &depth_sigma_per_m2, {0.0, 0.1},
              "depth noise: standard deviation / depth^2, 1/m");
   schema.add("motion.depth_bias_share", &depth_bias_share, {0.0, 0.2},
@@ -172,21 +176,46 @@ MotionCheckResult MotionCheck::step(const MotionFrame& frame, std::span<const Fl
   result.tracks.reserve(tracks.size());
   for (const FlowTrack& track : tracks) result.tracks.push_back(measure(track, result));
   result.noise_scale = noise_scale(result.tracks, tracks);
-  std::unordered_map<TrackId, int> moved;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     TrackMotion& motion = result.tracks[i];
     decide(tracks[i], result, motion);
-    if (motion.verdict == MotionVerdict::kMoving && motion.reason != MotionReason::kMemory)
-      moved[motion.id] = 0;
-    else if (const auto memory = moved_.find(motion.id);
-             memory != moved_.end() && motion.verdict == MotionVerdict::kMoving)
-      moved[motion.id] = memory->second + 1;
     result.moving += motion.verdict == MotionVerdict::kMoving;
     result.at_rest += motion.verdict == MotionVerdict::kStatic;
     result.unknown += motion.verdict == MotionVerdict::kUnknown;
   }
-  moved_ = std::move(moved);
+  remember(result.tracks);
   return result;
+}
+
+void MotionCheck::remember(std::span<const TrackMotion> motions) {
+  std::unordered_map<TrackId, Memory> moved;
+  for (const TrackMotion& motion : motions)
+    if (motion.verdict == MotionVerdict::kMoving) {
+      const auto before = moved_.find(motion.id);
+      const int since =
+          motion.reason != MotionReason::kMemory || before == moved_.end() ? 0 : before->second.frames_since + 1;
+      moved[motion.id] = {since, motion.moving_frames};
+    }
+  moved_ = std::move(moved);
+}
+
+// A point is found the better the more the grey values around it change, in each direction by itself: the covariance of
+// the flow is proportional to the inverse of the gradient's second moments (aperture problem). What a track slips grows
+// with its way.
+Eigen::Matrix2d MotionCheck::pixel_covariance(const TrackSample& then, const TrackSample& now) const {
+  constexpr double kStrongTexture = 20;  // squared grey levels per px: where the texture starts to matter
+  constexpr double kLeastTexture = 0.5;
+  const TrackSample& weak = now.texture.x() + now.texture.z() < then.texture.x() + then.texture.z() ? now : then;
+  Eigen::Matrix2d moments;
+  moments << weak.texture.x() + kLeastTexture, weak.texture.y(), weak.texture.y(), weak.texture.z() + kLeastTexture;
+  const double edge =
+      now.depth_m > 0 && then.depth_m > 0
+          ? std::min(1.0, 10.0 * std::max(now.depth_spread_m / now.depth_m, then.depth_spread_m / then.depth_m))
+          : 1;
+  const double slip =
+      (options_.slip_share + edge * (options_.edge_slip_share - options_.slip_share)) * (now.ideal - then.ideal).norm();
+  const double variance = 2 * options_.pixel_sigma_px * options_.pixel_sigma_px + slip * slip;
+  return variance * (Eigen::Matrix2d::Identity() + kStrongTexture * moments.inverse());
 }
 
 TrackMotion MotionCheck::measure(const FlowTrack& track, const MotionCheckResult& result) const {
@@ -221,7 +250,7 @@ TrackMotion MotionCheck::measure(const FlowTrack& track, const MotionCheckResult
   const SE3 now_from_then = current.camera_from_world * pose_of(then.frame)->camera_from_world.inverse();
   const double elapsed_s = now.time_s - then.time_s;
   if (!chosen) {
-    measure_on_segment(then, pixel, now_from_then, motion);
+    measure_on_segment(then, now, now_from_then, motion);
     return motion;
   }
   const Eigen::Vector3d ray = camera_.back_project(then.ideal.cast<double>(), 1);
@@ -233,8 +262,7 @@ TrackMotion MotionCheck::measure(const FlowTrack& track, const MotionCheckResult
   const double iz = 1 / predicted.z(), sigma_m = depth_sigma_m(options_, then);
   const Eigen::Vector2d shift(camera_.fx_px * iz * (along.x() - predicted.x() * iz * along.z()) * sigma_m,
                               camera_.fy_px * iz * (along.y() - predicted.y() * iz * along.z()) * sigma_m);
-  Eigen::Matrix2d covariance = shift * shift.transpose();
-  covariance.diagonal().array() += 2 * options_.pixel_sigma_px * options_.pixel_sigma_px;
+  const Eigen::Matrix2d covariance = shift * shift.transpose() + pixel_covariance(then, now);
   motion.reprojection_px = static_cast<float>(residual.norm());
   motion.reprojection_sigmas = static_cast<float>(std::sqrt(residual.dot(covariance.inverse() * residual)));
   Eigen::Vector3d displacement(residual.x() / camera_.fx_px * predicted.z(),
@@ -251,15 +279,17 @@ TrackMotion MotionCheck::measure(const FlowTrack& track, const MotionCheckResult
   return motion;
 }
 
-void MotionCheck::measure_on_segment(const TrackSample& then, const Eigen::Vector2d& pixel, const SE3& now_from_then,
+void MotionCheck::measure_on_segment(const TrackSample& then, const TrackSample& now, const SE3& now_from_then,
                                      TrackMotion& motion) const {
   motion.reason = MotionReason::kNoEvidence;
   const Eigen::Vector3d ray = camera_.back_project(then.ideal.cast<double>(), 1);
   const Eigen::Vector3d far = now_from_then.rotation() * ray, near = now_from_then * (ray * kNearestSceneM);
   if (far.z() < kNearestM || near.z() < kNearestM) return;
-  motion.reprojection_px =
-      static_cast<float>(distance_from_segment_px(pixel, camera_.project(near), camera_.project(far)));
-  motion.reprojection_sigmas = motion.reprojection_px / static_cast<float>(std::sqrt(2.0) * options_.pixel_sigma_px);
+  const Eigen::Vector2d offset =
+      offset_from_segment_px(now.ideal.cast<double>(), camera_.project(near), camera_.project(far));
+  motion.reprojection_px = static_cast<float>(offset.norm());
+  motion.reprojection_sigmas =
+      static_cast<float>(std::sqrt(offset.dot(pixel_covariance(then, now).inverse() * offset)));
 }
 
 double MotionCheck::noise_scale(std::span<const TrackMotion> motions, std::span<const FlowTrack> tracks) const {
@@ -287,7 +317,11 @@ void MotionCheck::decide(const FlowTrack& track, const MotionCheckResult& result
   const bool off_line = motion.epipolar_px > options_.epipolar_px * scale;
   const bool fits =
       measured && motion.reprojection_sigmas < at_rest && std::abs(motion.depth_sigmas) < options_.static_sigmas;
-  const auto set = [&motion](MotionVerdict verdict, MotionReason reason) {
+  const auto set = [&](MotionVerdict verdict, MotionReason reason) {
+    if (verdict == MotionVerdict::kMoving) {
+      const auto before = moved_.find(motion.id);
+      motion.moving_frames = before == moved_.end() ? 1 : before->second.in_a_row + 1;
+    }
     motion.verdict = verdict;
     motion.reason = reason;
   };
@@ -300,7 +334,7 @@ void MotionCheck::decide(const FlowTrack& track, const MotionCheckResult& result
   else if (!measured && !doubtful && motion.reprojection_px >= 0 && motion.reprojection_sigmas > moving)
     set(MotionVerdict::kMoving, MotionReason::kReprojection);
   else if (const auto memory = moved_.find(motion.id);
-           memory != moved_.end() && memory->second < options_.memory_frames && !fits)
+           memory != moved_.end() && memory->second.frames_since < options_.memory_frames && !fits)
     set(MotionVerdict::kMoving, MotionReason::kMemory);
   else if (fits || (measured && speed < options_.min_speed_m_s))
     set(MotionVerdict::kStatic, MotionReason::kNone);

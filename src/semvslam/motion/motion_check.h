@@ -42,12 +42,15 @@ struct TrackMotion {
   float reprojection_sigmas = 0;  // the same in units of its standard deviation
   float depth_residual_m = 0;     // measured - predicted depth; 0 where not measured
   float depth_sigmas = 0;
+  int moving_frames = 0;                                   // in a row up to now
   Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();  // in the present camera's axes, world at rest; 0 = unknown
 };
 
 struct MotionCheckOptions {
   double epipolar_px = 2.0;           // D above which a point moves
-  double pixel_sigma_px = 0.7;        // of a tracked point, one coordinate
+  double pixel_sigma_px = 0.5;        // of a tracked point, one coordinate
+  double slip_share = 0.02;           // of the way it went: tracks slip a little
+  double edge_slip_share = 0.08;      // the same where two depths meet: what is tracked there is no point of a surface
   double depth_sigma_per_m2 = 0.002;  // depth noise: sigma_z = this * z^2
   double depth_bias_share = 0.005;    // of z: errors of the depth that neighbours share (bent depth)
   double moving_sigmas = 4.5;         // residual above which a point moves
@@ -95,13 +98,19 @@ class MotionCheck {
     bool given = false;     // by the caller; the others were chained here
     bool doubtful = false;  // only predicted
   };
+  struct Memory {
+    int frames_since = 0;  // it was seen to move
+    int in_a_row = 0;      // frames that it moved
+  };
   const Pose* pose_of(FrameId frame) const;
   CameraMotion find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks);
   void add_pose(const MotionFrame& frame, const CameraMotion& motion);
   FundamentalEstimate find_fundamental(std::span<const FlowTrack> tracks, int age) const;
   TrackMotion measure(const FlowTrack& track, const MotionCheckResult& result) const;
-  void measure_on_segment(const TrackSample& then, const Eigen::Vector2d& pixel, const SE3& now_from_then,
+  void measure_on_segment(const TrackSample& then, const TrackSample& now, const SE3& now_from_then,
                           TrackMotion& motion) const;
+  Eigen::Matrix2d pixel_covariance(const TrackSample& then, const TrackSample& now) const;
+  void remember(std::span<const TrackMotion> motions);
   double noise_scale(std::span<const TrackMotion> motions, std::span<const FlowTrack> tracks) const;
   void decide(const FlowTrack& track, const MotionCheckResult& result, TrackMotion& motion) const;
 
@@ -111,8 +120,8 @@ class MotionCheck {
   MotionCheckOptions options_;
   CameraMotionOptions camera_options_;
   FundamentalOptions fundamental_options_;
-  std::vector<Pose> poses_;                 // oldest first
-  std::unordered_map<TrackId, int> moved_;  // frames since it was last seen to move
+  std::vector<Pose> poses_;  // oldest first
+  std::unordered_map<TrackId, Memory> moved_;
 };
 
 }  // namespace semvslam

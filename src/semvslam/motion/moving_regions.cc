@@ -12,6 +12,7 @@ namespace {
 constexpr double kSeedsPerTrack = 4;    // so many depth seeds are as good as a moving track
 constexpr int kSeedsAlone = 24;         // so many make a region without any moving track
 constexpr int kLeastHoldingLength = 4;  // frames a track must have been at rest to hold a region back
+constexpr int kLeastMovingFrames = 3;   // in a row that a point must have moved to found a region
 constexpr double kMergeShare = 0.5;     // of the smaller region's mask inside the larger: they are one
 
 float squared_distance(const cv::Point2f& a, const cv::Point2f& b) {
@@ -85,7 +86,8 @@ std::vector<MovingRegions::Evidence> MovingRegions::collect(const MotionFrame& f
     const TrackSample& sample = tracks[i].newest();
     const cv::Point2f pixel(sample.pixel.x(), sample.pixel.y());
     if (sample.excluded || !is_unclaimed(frame, pixel)) continue;
-    evidence.push_back({pixel, sample.depth_m, tracks[i].id(), motion.tracks[i].velocity_m_s});
+    evidence.push_back(
+        {pixel, sample.depth_m, tracks[i].id(), motion.tracks[i].velocity_m_s, motion.tracks[i].moving_frames});
   }
   if (!options_.depth_seeds) return evidence;
   const CameraMotion& camera = motion.camera;
@@ -114,7 +116,32 @@ bool MovingRegions::belong_together(const Evidence& a, const Evidence& b) const 
   return true;
 }
 
-void MovingRegions::assign(const MotionFrame& frame, std::vector<Evidence>& evidence) {
+bool MovingRegions::rests(std::span<const Evidence> evidence, std::span<const FlowTrack> tracks,
+                          const MotionCheckResult& motion) const {
+  constexpr float kAroundPx = 8;
+  std::vector<cv::Point2f> points, hull;
+  std::vector<float> depths;
+  double moving = 0;
+  for (const Evidence& e : evidence) {
+    for (const float dx : {-kAroundPx, kAroundPx})
+      for (const float dy : {-kAroundPx, kAroundPx}) points.emplace_back(e.pixel.x + dx, e.pixel.y + dy);
+    if (e.depth_m > 0) depths.push_back(e.depth_m);
+    moving += e.track.valid() ? 1 : 1 / kSeedsPerTrack;
+  }
+  cv::convexHull(points, hull);
+  int at_rest = 0;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const TrackSample& sample = tracks[i].newest();
+    if (motion.tracks[i].verdict != MotionVerdict::kStatic || tracks[i].length() < kLeastHoldingLength) continue;
+    if (cv::pointPolygonTest(hull, {sample.pixel.x(), sample.pixel.y()}, false) < 0) continue;
+    const auto alike = [&](float depth_m) { return std::abs(depth_m - sample.depth_m) < options_.cluster_m; };
+    at_rest += depths.empty() || std::any_of(depths.begin(), depths.end(), alike);
+  }
+  return at_rest > moving;
+}
+
+void MovingRegions::assign(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion,
+                           const std::vector<Evidence>& evidence) {
   for (Kept& kept : kept_) kept.fresh.clear();
   std::vector<Evidence> loose;
   for (const Evidence& e : evidence) {
@@ -138,6 +165,8 @@ void MovingRegions::assign(const MotionFrame& frame, std::vector<Evidence>& evid
     else
       loose.push_back(e);
   }
+  // A verdict of a single frame may be chance.
+  std::erase_if(loose, [](const Evidence& e) { return e.track.valid() && e.moving_frames < kLeastMovingFrames; });
   DisjointSets sets(loose.size());
   for (std::size_t i = 0; i < loose.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)
@@ -145,14 +174,14 @@ void MovingRegions::assign(const MotionFrame& frame, std::vector<Evidence>& evid
   for (std::size_t root = 0; root < loose.size(); ++root) {
     if (sets.root(root) != root) continue;
     Kept fresh;
-    double tracks = 0, seeds = 0;
+    double moving = 0, seeds = 0;
     for (std::size_t i = root; i < loose.size(); ++i)
       if (sets.root(i) == root) {
         fresh.fresh.push_back(loose[i]);
-        (loose[i].track.valid() ? tracks : seeds) += 1;
+        (loose[i].track.valid() ? moving : seeds) += 1;
       }
-    const bool enough = tracks > 0 ? tracks + seeds / kSeedsPerTrack >= options_.min_tracks : seeds >= kSeedsAlone;
-    if (!enough) continue;
+    const bool enough = moving > 0 ? moving + seeds / kSeedsPerTrack >= options_.min_tracks : seeds >= kSeedsAlone;
+    if (!enough || rests(fresh.fresh, tracks, motion)) continue;
     fresh.region.id = RegionId(next_id_++);
     fresh.region.moved_at_s = frame.time_s;
     fresh.cells = cv::Mat::zeros(grid_.rows, grid_.columns, CV_8UC1);
@@ -202,7 +231,7 @@ void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const
   region.tracks = moving;
   region.seeds = seeds;
   const int needed = std::max(1, options_.min_tracks - 1);
-  const bool moves = moving + seeds / kSeedsPerTrack >= needed;
+  const bool moves = moving + seeds / kSeedsPerTrack >= needed && !rests(kept.fresh, tracks, motion);
   if (moves) region.moved_at_s = frame.time_s;
   region.state = moves ? RegionState::kMoving : RegionState::kPaused;
   if (moving > 0) region.velocity_m_s = velocity / static_cast<float>(moving);
@@ -293,7 +322,7 @@ void MovingRegions::draw() {
 void MovingRegions::step(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion) {
   if (tracks.size() != motion.tracks.size())
     throw std::invalid_argument("moving regions: one verdict per track is needed");
-  std::vector<Evidence> evidence = collect(frame, tracks, motion);
+  const std::vector<Evidence> evidence = collect(frame, tracks, motion);
   if (evidence.empty() && kept_.empty()) {
     if (!regions_.empty()) draw();
     last_time_s_ = frame.time_s;
@@ -302,7 +331,7 @@ void MovingRegions::step(const MotionFrame& frame, std::span<const FlowTrack> tr
   const CellGrid before = std::move(grid_);
   grid_ = CellGrid(camera_, frame.depth);
   if (!kept_.empty()) carry(frame, before, motion);
-  assign(frame, evidence);
+  assign(frame, tracks, motion, evidence);
   for (Kept& kept : kept_) update(kept, frame, tracks, motion);
   merge();
   std::erase_if(kept_, [&](const Kept& kept) {

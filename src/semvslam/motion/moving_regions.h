@@ -66,6 +66,7 @@ class MovingRegions {
     float depth_m = 0;
     TrackId track;  // invalid: a depth seed
     Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();
+    int moving_frames = 0;
   };
   struct Kept {
     MovingRegion region;
@@ -79,7 +80,10 @@ class MovingRegions {
   bool is_unclaimed(const MotionFrame& frame, const cv::Point2f& pixel) const;
   bool belong_together(const Evidence& a, const Evidence& b) const;
   void carry(const MotionFrame& frame, const CellGrid& before, const MotionCheckResult& motion);
-  void assign(const MotionFrame& frame, std::vector<Evidence>& evidence);
+  bool rests(std::span<const Evidence> evidence, std::span<const FlowTrack> tracks,
+             const MotionCheckResult& motion) const;
+  void assign(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion,
+              const std::vector<Evidence>& evidence);
   void update(Kept& kept, const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion);
   void merge();
   void draw();
