@@ -14,7 +14,7 @@ import torch
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from segnet import boxes, model
+from segnet import boxes, cost, model
 
 
 def fuse(m):
@@ -166,13 +166,13 @@ def sha(path):
         return hashlib.sha256(f.read()).hexdigest()
 
 
-def about(state, out, size, trunk, box, mask):
+def about(net, state, out, size, trunk, box, mask):
     files = sorted(f for f in os.listdir(out) if f.endswith((".onnx", ".xml", ".bin")))
     return {"format": 1, "name": "semvslam-maskrcnn-" + state["backbone"], "backbone": state["backbone"], "trunk": trunk, "box": box, "mask": mask,
             "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
             "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
             "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
-            "semantic_share": 0.5, "mask_threshold": 0.48,
+            "semantic_share": 0.5, "mask_threshold": 0.48, "gflops": cost.gflops(net, size),
             "training": {"steps": state["step"], "images_seen": state["seen"]}, "sha256": {f: sha(os.path.join(out, f)) for f in files}}
 
 
@@ -193,7 +193,7 @@ def main():
         quantise(o.out, list(calibration(*o.int8, size)), o.keep_float)
         names = {g: n if g in o.keep_float else g + ".int8.xml" for g, n in names.items()}
     with open(os.path.join(o.out, "model.json"), "w") as f:
-        json.dump(about(state, o.out, size, **names), f, indent=1)
+        json.dump(about(net, state, o.out, size, **names), f, indent=1)
     print(json.dumps({f: os.path.getsize(os.path.join(o.out, f)) for f in sorted(os.listdir(o.out))}, indent=1))
 
 

@@ -23,8 +23,9 @@ struct EvalSegArguments {
   SegmenterOptions options;
 };
 
-nlohmann::json as_json(const SegmentationScore& s, const StageSummary& time, const std::string& model) {
-  return {{"model", model},
+nlohmann::json as_json(const SegmentationScore& s, const StageSummary& time, const Segmenter& segmenter) {
+  return {{"model", segmenter.description()},
+          {"gflops", segmenter.gflops()},
           {"images", s.images},
           {"person_pixel_iou", s.person_pixel_iou},
           {"person_pixel_recall", s.person_pixel_recall},
@@ -72,10 +73,13 @@ Result<int> run_eval_seg(EvalSegArguments a) {
                s.person_mask_ap, s.mask_ap50, s.mask_ap);
     fmt::print("{} persons above 96x96 px: {:.3f} found, mean IoU of the found {:.3f}\n", s.near_persons,
                s.near_person_recall, s.near_person_mean_iou);
-    fmt::print("ms per image: mean {:.1f}, median {:.1f}, p95 {:.1f}\n", time.mean_ms, time.median_ms, time.p95_ms);
+    fmt::print("ms per image, unsure objects included: mean {:.1f}, median {:.1f}, p95 {:.1f}\n", time.mean_ms,
+               time.median_ms, time.p95_ms);
+    if (const double g = (*segmenter)->gflops(); g > 0)
+      fmt::print("GFLOPs per image with 50 proposals and 5 masks (two operations a multiply-add): {:.2f}\n", g);
   }
   if (a.json.empty()) return static_cast<int>(kExitSuccess);
-  const std::string text = as_json(s, time, (*segmenter)->description()).dump(1) + "\n";
+  const std::string text = as_json(s, time, **segmenter).dump(1) + "\n";
   if (a.json == "-")
     fmt::print("{}", text);
   else if (const Status status = write_file_atomically(a.json, text); !status)

@@ -41,6 +41,8 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.channels = j.at("feature_channels").get<int>();
   m.semantic_share = j.at("semantic_share").get<float>();
   m.mask_threshold = j.at("mask_threshold").get<float>();
+  if (const auto cost = j.find("gflops"); cost != j.end())
+    m.gflops = {cost->at("trunk").get<double>(), cost->at("box").get<double>(), cost->at("mask").get<double>()};
   check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096,
         "'input' is no usable size");
   check(!m.classes.empty(), "'classes' is empty");

@@ -27,6 +27,12 @@ struct ModelDescription {
   float semantic_share = 0;     // weight of the semantic map in a person's mask
   float mask_threshold = 0.5f;  // of a person's mixed mask
 
+  /// 10^9 operations (two to a multiply-add) that each graph takes, counted when it was exported; 0 = not known.
+  struct Cost {
+    double trunk = 0, box_region = 0, mask_region = 0;
+    double of_image(int proposals, int masks) const { return trunk + proposals * box_region + masks * mask_region; }
+  } gflops;
+
   int anchors_per_cell() const { return static_cast<int>(anchor_sizes[0].size() * anchor_ratios.size()); }
 
   /// Reads folder/model.json. Errors: missing, no JSON, a key missing or out of range, a file that it names missing.

@@ -138,6 +138,12 @@ TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
   fs::remove_all(folder);
 }
 
+TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {
+  const auto model = ModelDescription::read(kModels);
+  ASSERT_TRUE(model) << model.error().message;
+  EXPECT_NEAR(model->gflops.of_image(50, 5), 4.33, 0.01);  // training/table2.py, the default network
+}
+
 /// The shipped network; these need OpenVINO.
 class ShippedNetwork : public ::testing::Test {
  protected:
@@ -181,15 +187,23 @@ TEST_F(ShippedNetwork, FindsWhatTheReferenceFinds) {
 
 TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
   const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
-  auto one = make(1), two = make(2);
-  ASSERT_TRUE(one && two);
-  const auto a = (*one)->segment(request(picture)), b = (*two)->segment(request(picture));
-  ASSERT_TRUE(a && b);
-  ASSERT_EQ(a->instances.size(), b->instances.size());
-  for (std::size_t i = 0; i < a->instances.size(); ++i) {
-    EXPECT_EQ(a->instances[i].score, b->instances[i].score);
-    EXPECT_EQ(a->instances[i].window, b->instances[i].window);
-    EXPECT_EQ(cv::norm(a->instances[i].mask, b->instances[i].mask, cv::NORM_INF), 0);
+  auto one = make(1);
+  ASSERT_TRUE(one);
+  const auto a = (*one)->segment(request(picture));
+  ASSERT_TRUE(a);
+  EXPECT_GT(a->instances.size(), 2u);  // at the low score of make(): enough to differ in
+  for (const int threads : {2, 3, 8}) {
+    auto more = make(threads);
+    ASSERT_TRUE(more);
+    const auto b = (*more)->segment(request(picture));
+    ASSERT_TRUE(b);
+    ASSERT_EQ(a->instances.size(), b->instances.size()) << threads;
+    for (std::size_t i = 0; i < a->instances.size(); ++i) {
+      EXPECT_EQ(a->instances[i].score, b->instances[i].score);
+      EXPECT_EQ(a->instances[i].box, b->instances[i].box);
+      EXPECT_EQ(a->instances[i].window, b->instances[i].window);
+      EXPECT_EQ(cv::norm(a->instances[i].mask, b->instances[i].mask, cv::NORM_INF), 0);
+    }
   }
 }
 
@@ -209,19 +223,6 @@ TEST_F(ShippedNetwork, OpenCvFindsTheSame) {
   const cv::Mat persons_a = a->mask_of_class("person"), persons_b = b->mask_of_class("person");
   EXPECT_GT(cv::countNonZero(persons_b), 1000);
   EXPECT_LT(cv::countNonZero(persons_a != persons_b), 0.01 * cv::countNonZero(persons_b));
-}
-
-TEST_F(ShippedNetwork, OddImagesGiveAResultOrAnError) {
-  auto segmenter = make(2, 0.5);
-  ASSERT_TRUE(segmenter);
-  for (const cv::Mat& image :
-       {cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)), cv::Mat(480, 640, CV_8UC1, cv::Scalar(90)),
-        cv::Mat(48, 64, CV_16UC1, cv::Scalar(9000)), cv::Mat(33, 17, CV_8UC4, cv::Scalar::all(50)),
-        cv::Mat(1, 3000, CV_8UC3, cv::Scalar::all(0)), cv::Mat(3648, 5472, CV_8UC3, cv::Scalar::all(30))}) {
-    const auto s = (*segmenter)->segment(request(image));
-    ASSERT_TRUE(s) << s.error().message;
-    EXPECT_EQ(s->size, image.size());
-  }
 }
 
 TEST_F(ShippedNetwork, AWrongGraphIsNamed) {

@@ -19,6 +19,11 @@ class OpenCvGraphs final : public NetworkGraphs {
     const int mask_shape[] = {kMaskBatch, kMaskCells, kMaskCells, model.channels};
     box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
     mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
+    // OpenCV knows the shapes for certain only once a graph has run; this also makes the first image as fast as the
+    // others.
+    check(model.trunk, trunk(cv::Mat::zeros(model.input, CV_8UC3)));
+    check(model.box, box_head());
+    check(model.mask, mask_head());
   }
 
   Result<TrunkOutput> trunk(const cv::Mat& image) override {
@@ -75,9 +80,18 @@ class OpenCvGraphs final : public NetworkGraphs {
   static cv::dnn::Net read(const std::filesystem::path& file) {
     if (file.extension() != ".onnx")
       throw std::runtime_error(fmt::format("{}: OpenCV reads .onnx graphs only", file.string()));
-    cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
-    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-    return net;
+    try {
+      cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
+      net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+      return net;
+    } catch (const cv::Exception& e) {
+      throw std::runtime_error(fmt::format("{}: is damaged or no ONNX graph ({})", file.string(), e.err));
+    }
+  }
+
+  template <typename T>
+  static void check(const std::string& file, const Result<T>& output) {
+    if (!output) throw std::runtime_error(fmt::format("{}: {}", file, output.error().message));
   }
 
   static std::span<const float> numbers(const cv::Mat& m, std::size_t wanted, const std::string& name) {
