@@ -146,7 +146,8 @@ def main():
                 f = [i for i, p in enumerate(avg) if p.is_floating_point()]
                 torch._foreach_lerp_([avg[i] for i in f], [mine[i] for i in f], 1 - d)
         for k, v in {**parts, "all": loss}.items():
-            mean[k] = mean.get(k, 0.0) * 0.98 + 0.02 * float(v.detach()) if k in mean else float(v.detach())
+            v = float(torch.as_tensor(v).detach())          # a batch without objects has plain zeros
+            mean[k] = mean[k] * 0.98 + 0.02 * v if k in mean else v
         if step % 50 == 0 and rank == 0:
             now = time.time()
             row = {"step": step, "seen": seen, "progress": round(progress, 4), "s_per_step": round((now - clock) / 50, 3), "cpu_s_per_step": round((time.process_time() - busy) / 50, 3),
