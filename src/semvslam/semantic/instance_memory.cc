@@ -11,7 +11,10 @@ constexpr int kGrid = 4;                  // px: overlaps are counted on every 4
 constexpr double kMerged = 0.5;           // share of a carried mask that others cover when it is no object of its own
 constexpr double kLeastMeasured = 0.5;    // share of a lost part that must have depth: without, nothing speaks for it
 constexpr double kLeastAgreement = 0.85;  // share of the segmented rest that the carried mask must cover
-constexpr int kGapPx = 5;                 // two outlines of one object differ by up to this
+constexpr double kHalfHidden = 0.6;       // share of an object that is seen when it counts as half hidden
+constexpr double kLeastPiece = 0.7;   // share of the smaller of two masks that the other covers if it is a piece of it
+constexpr float kDepthReachM = 0.4f;  // change of an object's median depth from frame to frame
+constexpr int kGapPx = 5;             // two outlines of one object differ by up to this
 
 /// Pixels on the grid of masks, one of them moved, and in both.
 struct Overlap {
@@ -78,16 +81,19 @@ int subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int m
   return cv::countNonZero(mask);
 }
 
-float median_depth_m(const cv::Rect& window, const cv::Mat& mask, const cv::Mat& half_depth, double& measured_share) {
+/// Over every `step`-th pixel of the mask (even); 0 without any.
+float median_depth_m(const cv::Rect& window, const cv::Mat& mask, const cv::Mat& half_depth, int step,
+                     double* measured_share = nullptr) {
+  if (half_depth.empty()) return 0;
   std::vector<float> depths;
   int n = 0;
-  for (int y = (window.y + 1) / 2 * 2; y < window.y + window.height; y += 2)
-    for (int x = (window.x + 1) / 2 * 2; x < window.x + window.width; x += 2) {
+  for (int y = (window.y + step - 1) / step * step; y < window.y + window.height; y += step)
+    for (int x = (window.x + step - 1) / step * step; x < window.x + window.width; x += step) {
       if (mask.at<std::uint8_t>(y - window.y, x - window.x) == 0) continue;
       ++n;
       if (const float d = half_depth.at<float>(y / 2, x / 2); d > 0) depths.push_back(d);
     }
-  measured_share = n > 0 ? static_cast<double>(depths.size()) / n : 0;
+  if (measured_share) *measured_share = n > 0 ? static_cast<double>(depths.size()) / n : 0;
   if (depths.empty()) return 0;
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -108,10 +114,10 @@ bool belongs(const cv::Rect& window, const cv::Mat& part, const Instance& rest, 
   cv::Mat rim;
   cv::dilate(touching, rim, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * kReach + 1, 2 * kReach + 1)));
   cv::bitwise_and(rim, part, rim);
-  double measured = 0, unused = 0;
-  median_depth_m(window, part, half_depth, measured);
-  const float there = median_depth_m(window, touching, half_depth, unused),
-              here = median_depth_m(window, rim, half_depth, unused);
+  double measured = 0;
+  median_depth_m(window, part, half_depth, 2, &measured);
+  const float there = median_depth_m(window, touching, half_depth, 2),
+              here = median_depth_m(window, rim, half_depth, 2);
   constexpr float kStepM = 0.12f;
   return measured >= kLeastMeasured && here > 0 && there > 0 && std::abs(here - there) < kStepM;
 }
@@ -160,6 +166,7 @@ struct InstanceMemory::Step {
   Segmentation& segmentation;
   std::size_t segmented;              // instances that the segmenter gave
   std::vector<std::size_t> track_of;  // per segmented instance; kNone = new
+  std::vector<float> depths_m;        // per segmented instance; 0 = unknown
   std::vector<bool> found;            // per track
   MemoryReport report;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
@@ -167,16 +174,20 @@ struct InstanceMemory::Step {
 
 MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional<SE3>& cur_from_prev, bool lacking,
                                   Segmentation& segmentation) {
-  Step step{present, cur_from_prev, lacking, segmentation, segmentation.instances.size(), {}, {}, {}};
+  Step step{present, cur_from_prev, lacking, segmentation, segmentation.instances.size(), {}, {}, {}, {}};
   step.track_of.assign(step.segmented, Step::kNone);
   step.found.assign(tracks_.size(), false);
-  for (Track& t : tracks_)
+  for (const Instance& i : segmentation.instances)
+    step.depths_m.push_back(median_depth_m(i.window, i.mask, present.half_depth_m(), 8));
+  for (Track& t : tracks_) {
+    ++t.whole_age;
     t.present_from_whole = t.present_from_whole && cur_from_prev
                                ? std::optional<SE3>(*cur_from_prev * *t.present_from_whole)
                                : std::nullopt;
+  }
   match(step);
   for (std::size_t i = 0; i < step.segmented; ++i)
-    if (step.track_of[i] != Step::kNone) follow(step, tracks_[step.track_of[i]], segmentation.instances[i]);
+    if (step.track_of[i] != Step::kNone) follow(step, tracks_[step.track_of[i]], i);
   std::vector<Track> kept;
   for (std::size_t t = 0; t < tracks_.size(); ++t)
     if (step.found[t] || restore(step, tracks_[t])) kept.push_back(std::move(tracks_[t]));
@@ -187,6 +198,7 @@ MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional
     Track fresh;
     fresh.id = now.track;
     fresh.confirmed = 1;
+    fresh.depth_m = step.depths_m[i];
     renew(step, fresh, now, cv::countNonZero(now.mask));
     kept.push_back(std::move(fresh));
   }
@@ -202,11 +214,18 @@ void InstanceMemory::match(Step& step) {
   std::vector<Candidate> candidates;
   for (std::size_t t = 0; t < tracks_.size(); ++t)
     for (std::size_t i = 0; i < step.segmented; ++i) {
-      const Instance &before = tracks_[t].last, &now = step.segmentation.instances[i];
-      if (now.role != Role::kDynamic || now.class_name != before.class_name) continue;
-      const double iou =
-          overlap(before.window, before.mask, cv::Point(tracks_[t].velocity_px), now.window, now.mask).iou();
-      if (iou >= options_.least_overlap) candidates.push_back({iou, t, i});
+      const Track& track = tracks_[t];
+      const Instance& now = step.segmentation.instances[i];
+      if (now.role != Role::kDynamic || now.class_name != track.whole.class_name) continue;
+      const Overlap o = overlap(track.last.window, track.last.mask, cv::Point(track.velocity_px), now.window, now.mask);
+      const cv::Point2f shift = track.shift_px + track.velocity_px;
+      const Overlap w = overlap(track.whole.window, track.whole.mask, cv::Point(shift), now.window, now.mask);
+      const bool known = track.depth_m > 0 && step.depths_m[i] > 0;
+      const bool same_depth = known && std::abs(track.depth_m - step.depths_m[i]) < kDepthReachM;
+      // Half hidden, an object is a piece of what it was.
+      const bool piece = same_depth && w.both > kLeastPiece * std::min(w.first, w.second);
+      if (((o.iou() >= options_.least_overlap && !track.hidden) && (same_depth || !known)) || piece)
+        candidates.push_back({std::max(track.hidden ? 0 : o.iou(), w.iou()), t, i});
     }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.iou > b.iou; });
@@ -217,7 +236,8 @@ void InstanceMemory::match(Step& step) {
   }
 }
 
-void InstanceMemory::follow(Step& step, Track& track, Instance& now) {
+void InstanceMemory::follow(Step& step, Track& track, std::size_t index) {
+  Instance& now = step.segmentation.instances[index];
   const int segmented_px = cv::countNonZero(now.mask);
   const bool shrunk = segmented_px < (1 - options_.limb_trigger) * track.whole_px;
   const cv::Point2f moved = centre(now) - centre(track.last);
@@ -225,9 +245,13 @@ void InstanceMemory::follow(Step& step, Track& track, Instance& now) {
                         track.extended < options_.longest_carry && extend(step, track, now);
   track.extended = extended ? track.extended + 1 : 0;
   track.carried = 0;
+  track.hidden = false;
+  if (step.depths_m[index] > 0) track.depth_m = step.depths_m[index];
   ++track.confirmed;
   now.track = track.id;
-  if (!extended) {
+  // Half hidden, it stays known as a whole for a while, to be found again on the other side.
+  const bool half_hidden = segmented_px < kHalfHidden * track.whole_px && track.whole_age <= options_.longest_carry;
+  if (!extended && !half_hidden) {
     renew(step, track, now, segmented_px);
     track.velocity_px = moved;
   }
@@ -239,6 +263,7 @@ void InstanceMemory::renew(const Step& step, Track& track, const Instance& now, 
   track.whole = now;
   track.whole_images = step.present;
   track.whole_px = pixels;
+  track.whole_age = 0;
   track.present_from_whole = SE3();
   track.shift_px = {};
 }
@@ -285,7 +310,9 @@ bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
 bool InstanceMemory::restore(Step& step, Track& track) {
   if (track.confirmed < options_.confirmations || track.carried >= options_.longest_carry) return false;
   CarriedMask carried = carry_whole(step, track);
-  if (carried.outcome != CarryOutcome::kVisible) return false;
+  track.hidden = carried.outcome == CarryOutcome::kOccluded;
+  if (track.hidden) ++track.carried;
+  if (carried.outcome != CarryOutcome::kVisible) return track.hidden;
   const int carried_px = cv::countNonZero(carried.mask);
   int left = carried_px;
   for (std::size_t i = 0; i < step.segmented; ++i)

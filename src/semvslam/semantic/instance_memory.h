@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -48,15 +49,18 @@ class InstanceMemory {
     Instance whole;  // as last segmented without loss: what is carried, so that errors do not add up
     CarryFrame whole_images;
     int whole_px = 0;
+    int whole_age = 0;                      // frames
+    float depth_m = 0;                      // median; 0 = unknown
     std::optional<SE3> present_from_whole;  // camera motion since then; none = unknown
     cv::Point2f shift_px, velocity_px;      // motion since then, motion per frame
     int confirmed = 0;                      // frames in which it was segmented
     int carried = 0;                        // frames in a row without
+    bool hidden = false;                    // behind something nearer; may come out again
     int extended = 0;                       // frames in a row with a part put back
   };
   struct Step;  // what belongs to one call of step()
   void match(Step& step);
-  void follow(Step& step, Track& track, Instance& now);
+  void follow(Step& step, Track& track, std::size_t index);
   bool extend(Step& step, Track& track, Instance& now);
   CarriedMask carry_whole(const Step& step, Track& track) const;
   static void renew(const Step& step, Track& track, const Instance& now, int pixels);

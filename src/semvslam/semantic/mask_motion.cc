@@ -158,13 +158,14 @@ float distance(cv::Point2f a, cv::Point2f b) { return std::hypot(a.x - b.x, a.y 
 
 /// Drops what moves unlike the rest and unlike its neighbours, and what lands on another depth.
 std::vector<Pair> consistent(std::vector<Pair> pairs, Affine& affine) {
+  // Farther than a person comes in a few frames: LK held on to what is behind or in front of her.
+  constexpr float kFarthestM = 0.3f, kSpreadM = 0.15f;
+  std::erase_if(pairs, [&](const Pair& p) { return p.has_depth && std::abs(p.depth_change_m) > kFarthestM; });
   std::vector<float> changes;
   for (const Pair& p : pairs)
     if (p.has_depth) changes.push_back(p.depth_change_m);
   const float change = median(changes);
-  constexpr float kDepthLimitM = 0.3f;
-  std::erase_if(pairs,
-                [&](const Pair& p) { return p.has_depth && std::abs(p.depth_change_m - change) > kDepthLimitM; });
+  std::erase_if(pairs, [&](const Pair& p) { return p.has_depth && std::abs(p.depth_change_m - change) > kSpreadM; });
   for (int round = 0; round < 2 && pairs.size() >= kLeastPoints; ++round) {
     affine = fit_affine(pairs);
     std::vector<cv::Point2f> rest;
@@ -247,7 +248,7 @@ MaskMotion estimate_motion(const Camera& camera, const MaskCarryOptions& options
     }
     if (flow && points.size() >= kLeastPoints) {
       std::vector<Pair> followed = consistent(pairs_by_flow(from, to, points, out.shift), affine);
-      if (followed.size() >= kLeastPoints) {
+      if (followed.size() >= std::max<std::size_t>(kLeastPoints, points.size() / 5)) {
         pairs = std::move(followed);
         out.flow_points = static_cast<int>(pairs.size());
       }
