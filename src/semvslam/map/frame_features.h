@@ -19,7 +19,7 @@ struct NoiseModel {
   /// whole depth image by half a percent and more, so hundreds of points must not vote as hundreds of measurements. The
   /// depth fixes the scale and starts the landmarks; their shape comes from the pixels.
   double disparity_weight = 0.03;
-  double depth_edge_ratio = 0.04;  // depth that spreads more than this share within the 3x3 window is an edge: not used
+  double depth_edge_ratio = 0.04;  // depth that spreads by more than this share around a corner is an edge: not used
   double min_depth_m = 0.1;
   double max_depth_m = 8.0;
 };
