@@ -12,7 +12,11 @@ constexpr double kLeastGapM = 0.06;  // and by at least so much
 }  // namespace
 
 DepthSeeds::DepthSeeds(const Camera& camera, const MotionCheckOptions& options, int step_px)
-    : camera_(camera), options_(options), step_px_(step_px) {}
+    : camera_(camera), options_(options) {
+  for (int y = step_px / 2; y < camera.height_px; y += step_px)
+    for (int x = step_px / 2; x < camera.width_px; x += step_px)
+      raster_.push_back({{x, y}, camera.back_project(camera.undistort(Eigen::Vector2d(x, y)), 1)});
+}
 
 bool DepthSeeds::was_empty(const Past& past, const Eigen::Vector3d& point) const {
   const Eigen::Vector3d p = past.past_from_cur * point;
@@ -45,15 +49,10 @@ const std::vector<DepthSeed>& DepthSeeds::step(const cv::Mat& depth, const std::
   if (past_.size() > 1) {
     const Past& past = past_.front();
     const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
-    for (int y = step_px_ / 2; y < depth.rows; y += step_px_)
-      for (int x = step_px_ / 2; x < depth.cols; x += step_px_) {
-        const float z = motion_depth_m(depth, unit, x, y);
-        if (!(z > 0)) continue;
-        // A first look without the lens and without neighbours spares most places the full test.
-        const Eigen::Vector2d ideal = camera_.undistort(Eigen::Vector2d(x, y));
-        const Eigen::Vector3d point = camera_.back_project(ideal, z);
-        if (was_empty(past, point)) seeds_.push_back({{x, y}, z});
-      }
+    for (const Place& place : raster_) {
+      const float z = motion_depth_m(depth, unit, place.pixel.x, place.pixel.y);
+      if (z > 0 && was_empty(past, place.ray * z)) seeds_.push_back({place.pixel, z});
+    }
   }
   past_.push_back({depth, SE3()});
   if (past_.size() > kFramesBack) past_.pop_front();

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "semvslam/geometry/camera.h"
@@ -37,7 +38,11 @@ class DepthSeeds {
 
   Camera camera_;
   MotionCheckOptions options_;
-  int step_px_;
+  struct Place {
+    cv::Point pixel;
+    Eigen::Vector3d ray;  // z = 1, without lens distortion
+  };
+  std::vector<Place> raster_;
   std::deque<Past> past_;  // oldest first
   std::vector<DepthSeed> seeds_;
 };

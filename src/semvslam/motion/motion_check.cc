@@ -315,8 +315,9 @@ void MotionCheck::decide(const FlowTrack& track, const MotionCheckResult& result
   const double moving = options_.moving_sigmas * scale, at_rest = options_.static_sigmas * scale;
   const double speed = motion.velocity_m_s.norm();
   const bool off_line = motion.epipolar_px > options_.epipolar_px * scale;
-  const bool fits =
-      measured && motion.reprojection_sigmas < at_rest && std::abs(motion.depth_sigmas) < options_.static_sigmas;
+  const bool by_segment = motion.reason == MotionReason::kNoEvidence && !doubtful && motion.reprojection_px >= 0;
+  const bool fits = (measured || by_segment) && motion.reprojection_sigmas < at_rest &&
+                    std::abs(motion.depth_sigmas) < options_.static_sigmas;
   const auto set = [&](MotionVerdict verdict, MotionReason reason) {
     if (verdict == MotionVerdict::kMoving) {
       const auto before = moved_.find(motion.id);
@@ -329,14 +330,14 @@ void MotionCheck::decide(const FlowTrack& track, const MotionCheckResult& result
     set(MotionVerdict::kMoving, off_line ? MotionReason::kEpipolar : MotionReason::kReprojection);
   else if (measured && speed >= options_.min_speed_m_s && std::abs(motion.depth_sigmas) > options_.moving_sigmas)
     set(MotionVerdict::kMoving, motion.depth_residual_m < 0 ? MotionReason::kNearer : MotionReason::kFarther);
-  else if (off_line && !measured)
+  else if (by_segment && motion.reprojection_sigmas > moving)
+    set(MotionVerdict::kMoving, off_line ? MotionReason::kEpipolar : MotionReason::kReprojection);
+  else if (off_line && !measured && !by_segment)
     set(MotionVerdict::kMoving, MotionReason::kEpipolar);
-  else if (!measured && !doubtful && motion.reprojection_px >= 0 && motion.reprojection_sigmas > moving)
-    set(MotionVerdict::kMoving, MotionReason::kReprojection);
   else if (const auto memory = moved_.find(motion.id);
            memory != moved_.end() && memory->second.frames_since < options_.memory_frames && !fits)
     set(MotionVerdict::kMoving, MotionReason::kMemory);
-  else if (fits || (measured && speed < options_.min_speed_m_s))
+  else if ((fits && measured) || (measured && speed < options_.min_speed_m_s))
     set(MotionVerdict::kStatic, MotionReason::kNone);
   else if (doubtful)
     set(MotionVerdict::kUnknown, MotionReason::kNoPose);

@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kSeedsPerTrack = 4;    // so many depth seeds are as good as a moving track
 constexpr int kSeedsAlone = 24;         // so many make a region without any moving track
+constexpr int kLeastSeeds = 2;          // fewer: the depth says nothing of a moving thing, and the tracks need ...
+constexpr int kTracksAlone = 3;         // ... to be so many times as many
 constexpr int kLeastHoldingLength = 4;  // frames a track must have been at rest to hold a region back
 constexpr int kLeastMovingFrames = 3;   // in a row that a point must have moved to found a region
 constexpr double kMergeShare = 0.5;     // of the smaller region's mask inside the larger: they are one
@@ -86,8 +88,8 @@ std::vector<MovingRegions::Evidence> MovingRegions::collect(const MotionFrame& f
     const TrackSample& sample = tracks[i].newest();
     const cv::Point2f pixel(sample.pixel.x(), sample.pixel.y());
     if (sample.excluded || !is_unclaimed(frame, pixel)) continue;
-    evidence.push_back(
-        {pixel, sample.depth_m, tracks[i].id(), motion.tracks[i].velocity_m_s, motion.tracks[i].moving_frames});
+    evidence.push_back({pixel, sample.depth_m, tracks[i].id(), motion.tracks[i].velocity_m_s,
+                        motion.tracks[i].moving_frames, sample.depth_spread_m});
   }
   if (!options_.depth_seeds) return evidence;
   const CameraMotion& camera = motion.camera;
@@ -180,7 +182,9 @@ void MovingRegions::assign(const MotionFrame& frame, std::span<const FlowTrack> 
         fresh.fresh.push_back(loose[i]);
         (loose[i].track.valid() ? moving : seeds) += 1;
       }
-    const bool enough = moving > 0 ? moving + seeds / kSeedsPerTrack >= options_.min_tracks : seeds >= kSeedsAlone;
+    // Reflections on glossy things move as well, but no surface with them.
+    const double needed = options_.min_tracks * (options_.depth_seeds && seeds < kLeastSeeds ? kTracksAlone : 1);
+    const bool enough = moving > 0 ? moving + seeds / kSeedsPerTrack >= needed : seeds >= kSeedsAlone;
     if (!enough || rests(fresh.fresh, tracks, motion)) continue;
     fresh.region.id = RegionId(next_id_++);
     fresh.region.moved_at_s = frame.time_s;
@@ -212,6 +216,20 @@ void MovingRegions::carry(const MotionFrame& frame, const CellGrid& before, cons
     }
     cv::morphologyEx(cells, kept.cells, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
   }
+}
+
+std::vector<MovingRegions::Evidence> MovingRegions::without_strays(const std::vector<Evidence>& anchors) const {
+  DisjointSets sets(anchors.size());
+  for (std::size_t i = 0; i < anchors.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (sets.root(i) != sets.root(k) && belong_together(anchors[i], anchors[k])) sets.join(i, k);
+  std::vector<double> weight(anchors.size(), 0);
+  for (std::size_t i = 0; i < anchors.size(); ++i)
+    weight[sets.root(i)] += anchors[i].track.valid() ? 1 : 1 / kSeedsPerTrack;
+  std::vector<Evidence> kept;
+  for (std::size_t i = 0; i < anchors.size(); ++i)
+    if (weight[sets.root(i)] >= options_.min_tracks) kept.push_back(anchors[i]);
+  return kept;
 }
 
 void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const FlowTrack> tracks,
@@ -256,10 +274,15 @@ void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const
     }
   }
   kept.members = std::move(alive);
-  for (const Evidence& e : kept.anchors) from.push_back({e.pixel, e.depth_m});
   if (!depths.empty()) {
     std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
     region.depth_m = depths[depths.size() / 2];
+  }
+  for (const Evidence& e : without_strays(kept.anchors)) {
+    // At an edge of depth it is open which side a track belongs to.
+    const bool edge = e.depth_spread_m > 0.05f * e.depth_m;
+    if (edge && region.depth_m > 0 && std::abs(e.depth_m - region.depth_m) > options_.cluster_m) continue;
+    from.push_back({e.pixel, e.depth_m});
   }
   // Where the region was before it still is, as long as the depth says so; that keeps smooth surfaces without points.
   cv::Mat held = cv::Mat::zeros(grid_.rows, grid_.columns, CV_8UC1);
@@ -269,6 +292,7 @@ void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const
       held.data[cell] = 255;
   GrowthLimits limits;
   limits.margin_px = options_.margin_px;
+  limits.bridge_px = options_.cluster_px;
   limits.reach_m = options_.cluster_m;
   if (from.empty()) {
     kept.cells = held;

@@ -39,7 +39,7 @@ struct MovingRegionOptions {
   int min_tracks = 3;       // moving tracks (and depth seeds) that make a new region
   double cluster_px = 60;   // tracks farther apart in the image ...
   double cluster_m = 0.35;  // ... or in space are in different regions
-  double margin_px = 25;    // a region may reach that far beyond its tracks
+  double margin_px = 25;    // a region may reach that far from its tracks
   double hold_s = 1.0;      // it is kept for that long after it stopped
   bool depth_seeds = true;  // use surfaces nearer than predicted as further evidence
   int seed_step_px = 8;     // raster on which they are looked for
@@ -67,6 +67,7 @@ class MovingRegions {
     TrackId track;  // invalid: a depth seed
     Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();
     int moving_frames = 0;
+    float depth_spread_m = 0;
   };
   struct Kept {
     MovingRegion region;
@@ -84,6 +85,7 @@ class MovingRegions {
              const MotionCheckResult& motion) const;
   void assign(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion,
               const std::vector<Evidence>& evidence);
+  std::vector<Evidence> without_strays(const std::vector<Evidence>& anchors) const;
   void update(Kept& kept, const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion);
   void merge();
   void draw();

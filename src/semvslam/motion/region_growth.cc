@@ -2,42 +2,55 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
-#include <queue>
 
 #include "semvslam/motion/motion_frame.h"
 
 namespace semvslam {
 namespace {
 
+constexpr int kLongestHole = 4;  // cells without depth that a region may cross
+
 struct Front {
-  float cost;
   int cell;
   float origin_depth_m;  // of the seed that it came from
   float depth_m;         // last measured on the way
+  int hole;              // cells without depth since then
   bool ours;
-  // Ties are broken by the cell, then against growing: the result does not depend on the order of pushing.
-  bool operator>(const Front& other) const {
-    if (cost != other.cost) return cost > other.cost;
-    if (cell != other.cell) return cell > other.cell;
-    return ours > other.ours;
-  }
 };
 
-// Cells inside the convex hull of the seeds and the margin around it.
-cv::Mat allowed_cells(const CellGrid& grid, std::span<const GrowthSeed> seeds, double margin_px) {
-  std::vector<cv::Point> points, hull;
+// Fronts by cost, which are small whole numbers; those of one cost come out in the order they went in.
+class FrontQueue {
+ public:
+  void push(int cost, const Front& front) {
+    if (static_cast<int>(levels_.size()) <= cost) levels_.resize(static_cast<std::size_t>(cost) + 4);
+    levels_[static_cast<std::size_t>(cost)].push_back(front);
+  }
+  bool pop(int& cost, Front& front) {
+    while (level_ < levels_.size() && next_ == levels_[level_].size()) ++level_, next_ = 0;
+    if (level_ == levels_.size()) return false;
+    cost = static_cast<int>(level_);
+    front = levels_[level_][next_++];
+    return true;
+  }
+
+ private:
+  std::vector<std::vector<Front>> levels_;
+  std::size_t level_ = 0, next_ = 0;
+};
+
+// Cells within the margin of a seed, and those between seeds that are near to each other.
+cv::Mat allowed_cells(const CellGrid& grid, std::span<const GrowthSeed> seeds, const GrowthLimits& limits) {
+  cv::Mat allowed = cv::Mat::zeros(grid.rows, grid.columns, CV_8UC1);
+  const int radius = std::max(1, static_cast<int>(std::lround(limits.margin_px / CellGrid::kCellPx)));
   for (const GrowthSeed& seed : seeds) {
     const int cell = grid.cell_of(seed.pixel);
-    points.emplace_back(cell % grid.columns, cell / grid.columns);
+    cv::circle(allowed, {cell % grid.columns, cell / grid.columns}, radius, 255, cv::FILLED);
   }
-  cv::convexHull(points, hull);
-  cv::Mat allowed = cv::Mat::zeros(grid.rows, grid.columns, CV_8UC1);
-  const int thickness = std::max(1, 2 * static_cast<int>(std::lround(margin_px / CellGrid::kCellPx)));
-  if (hull.size() > 2) cv::fillConvexPoly(allowed, hull, 255);
-  cv::polylines(allowed, hull, true, 255, thickness);
-  return allowed;
+  const int bridge = static_cast<int>(limits.bridge_px / CellGrid::kCellPx) | 1;
+  cv::Mat closed;
+  cv::morphologyEx(allowed, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {bridge, bridge}));
+  return closed;
 }
 
 }  // namespace
@@ -64,20 +77,19 @@ cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std
                     const GrowthLimits& limits) {
   cv::Mat taken = cv::Mat::zeros(grid.rows, grid.columns, CV_8UC1);
   if (seeds.empty() || grid.size() == 0) return taken;
-  const cv::Mat allowed = allowed_cells(grid, seeds, limits.margin_px);
-  std::priority_queue<Front, std::vector<Front>, std::greater<>> open;
+  const cv::Mat allowed = allowed_cells(grid, seeds, limits);
+  FrontQueue open;
   const auto start = [&](const GrowthSeed& seed, bool ours) {
     const int cell = grid.cell_of(seed.pixel);
     if (!allowed.data[cell]) return;
     const float depth_m = seed.depth_m > 0 ? seed.depth_m : grid.depth_m[static_cast<std::size_t>(cell)];
-    open.push({0, cell, depth_m, depth_m, ours});
+    open.push(0, {cell, depth_m, depth_m, 0, ours});
   };
+  for (const GrowthSeed& seed : against) start(seed, false);  // first: in doubt a place is at rest
   for (const GrowthSeed& seed : seeds) start(seed, true);
-  for (const GrowthSeed& seed : against) start(seed, false);
   std::vector<std::uint8_t> done(grid.size(), 0);
-  while (!open.empty()) {
-    const Front at = open.top();
-    open.pop();
+  int cost = 0;
+  for (Front at{}; open.pop(cost, at);) {
     if (done[static_cast<std::size_t>(at.cell)]) continue;
     done[static_cast<std::size_t>(at.cell)] = 1;
     if (at.ours) taken.data[at.cell] = 255;
@@ -88,13 +100,15 @@ cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std
       if (done[static_cast<std::size_t>(next)] || !allowed.data[next]) continue;
       const float z = grid.depth_m[static_cast<std::size_t>(next)];
       if (!(z > 0)) {  // holes are crossed, but are twice as far
-        open.push({at.cost + 2, next, at.origin_depth_m, at.depth_m, at.ours});
+        if (at.hole < kLongestHole) open.push(cost + 2, {next, at.origin_depth_m, at.depth_m, at.hole + 1, at.ours});
         continue;
       }
       const float origin = at.origin_depth_m > 0 ? at.origin_depth_m : z, last = at.depth_m > 0 ? at.depth_m : z;
-      if (std::abs(z - last) > static_cast<float>(limits.step_share) * std::max(z, 1.f)) continue;
+      // A hole may hide a slope.
+      const float step = static_cast<float>(limits.step_share * (1 + at.hole));
+      if (std::abs(z - last) > step * std::max(z, 1.f)) continue;
       if (std::abs(z - origin) > static_cast<float>(limits.reach_m)) continue;
-      open.push({at.cost + 1, next, origin, z, at.ours});
+      open.push(cost + 1, {next, origin, z, 0, at.ours});
     }
   }
   return taken;

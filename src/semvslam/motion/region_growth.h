@@ -15,7 +15,8 @@ struct GrowthSeed {
 };
 
 struct GrowthLimits {
-  double margin_px = 25;      // beyond the hull of the seeds
+  double margin_px = 25;      // about each seed
+  double bridge_px = 60;      // seeds as near as that are one area with what lies between them
   double reach_m = 0.35;      // in depth, from the seed that a place was reached from
   double step_share = 0.025;  // of the depth: a larger step between neighbours is an edge
 };
@@ -36,7 +37,8 @@ struct CellGrid {
   }
 };
 
-/// Grows a region from the seeds over cells whose depth continues smoothly, within a margin of the seeds' convex hull.
+/// Grows a region from the seeds over cells whose depth continues smoothly, within a margin of the seeds and between
+/// seeds near each other.
 /// Places nearer (along the surface) to one of `against` than to a seed are not taken.
 /// @return CV_8UC1, rows x columns of the grid, 255 = taken.
 cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std::span<const GrowthSeed> against,
