@@ -167,13 +167,14 @@ def main():
     parser.add_argument("--size", default="640x480")
     parser.add_argument("--report", type=pathlib.Path)
     a = parser.parse_args()
+    a.program = a.program.resolve()
     rendered = a.folder / f"rendered_{a.motion}_{a.rendered}_{a.size}"
     if not rendered.exists():
         a.folder.mkdir(parents=True, exist_ok=True)
         subprocess.run([a.program, "render", "--people", "none", "--motion", a.motion, "--frames", str(a.rendered),
                         "--size", a.size, "--out", rendered, "--threads", str(os.cpu_count() or 1)], check=True)
     passes = stretch(rendered, a.folder / "sequence", a.frames)
-    samples, stats = follow(a.program.resolve(), a.folder / "sequence", a.folder / "out")
+    samples, stats = follow(a.program, a.folder / "sequence", a.folder / "out")
     rows = bins(samples)
     error = json.loads((a.folder / "out" / "evaluation.json").read_text())["estimate"]["ate_m"]["rmse"]
     for row in rows:
