@@ -32,10 +32,10 @@ struct CameraMotionOptions {
   std::uint64_t seed = 1;
   int min_points = 12;     // that must agree
   int cell_px = 80;        // votes are counted per cell of the image, so that a big thing with many points has few
-  double inlier_px = 2.0;  // reprojection error of a pair that agrees
+  double inlier_px = 1.5;  // reprojection error of a pair that agrees
   double depth_sigma_per_m2 = 0.002;
   double depth_bias_share = 0.005;
-  double prediction_sigma_m = 0.02, prediction_sigma_rad = 0.02;  // how far from the hint counts against a hypothesis
+  double prediction_sigma_m = 0.008, prediction_sigma_rad = 0.008;  // how far from the hint counts against a hypothesis
   int max_iterations = 120;
 
   void add_to(ConfigSchema& schema);

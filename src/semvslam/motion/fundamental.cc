@@ -105,24 +105,36 @@ double homography_share(Pixels a, Pixels b, const FundamentalEstimate& f, const 
   return static_cast<double>(found.inliers) / static_cast<double>(from.size());
 }
 
-// Least squares on the inliers as long as that wins more of them.
+// Least squares on the inliers, then on those that their own scatter leaves: outliers that lie near their line by
+// chance would turn it.
 void refine(Pixels a, Pixels b, const EpipolarProblem& problem, double squared_limit, FundamentalEstimate& estimate) {
+  std::vector<double> squared(a.size());
   for (int round = 0; round < 3; ++round) {
+    std::vector<double> of_inliers;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      squared[i] = problem.squared_residual(estimate.matrix, i);
+      if (squared[i] <= squared_limit) of_inliers.push_back(squared[i]);
+    }
+    if (of_inliers.size() < 8) return;
+    const auto middle = of_inliers.begin() + static_cast<std::ptrdiff_t>(of_inliers.size() / 2);
+    std::nth_element(of_inliers.begin(), middle, of_inliers.end());
+    const double sigmas = 3 * 1.4826;  // of the median: three standard deviations
+    const double limit = std::min(squared_limit, sigmas * sigmas * *middle);
     std::vector<Eigen::Vector2d> from, to;
     for (std::size_t i = 0; i < a.size(); ++i)
-      if (estimate.inlier[i]) from.push_back(a[i]), to.push_back(b[i]);
+      if (squared[i] <= limit) from.push_back(a[i]), to.push_back(b[i]);
     const auto refined = fundamental_eight_point(from, to);
     if (!refined) return;
     std::vector<std::uint8_t> inlier(a.size());
     int inliers = 0;
-    for (std::size_t i = 0; i < a.size(); ++i)
-      inliers += inlier[i] = problem.squared_residual(*refined, i) <= squared_limit;
-    if (inliers < estimate.inliers) return;
-    const bool same = inliers == estimate.inliers;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      inlier[i] = problem.squared_residual(*refined, i) <= squared_limit;
+      inliers += inlier[i];
+    }
+    if (inliers < 9 * estimate.inliers / 10) return;
     estimate.matrix = *refined;
     estimate.inlier = std::move(inlier);
     estimate.inliers = inliers;
-    if (same) return;
   }
 }
 

@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::size_t kPosesHeld = FlowTrack::kCapacity + 2;
 constexpr double kNearestM = 0.05;
-constexpr double kNearestSceneM = 0.3;  // nothing of the scene is nearer: end of a point's epipolar line
+constexpr double kSuspectWeight = 0.15;  // of a vote from where something moved: not 0, it may have been an error
+constexpr double kNearestSceneM = 0.3;   // nothing of the scene is nearer: end of a point's epipolar line
 
 double depth_sigma_m(const MotionCheckOptions& options, const TrackSample& sample) {
   const double z = sample.depth_m, noise = options.depth_sigma_per_m2 * z * z, bias = options.depth_bias_share * z;
@@ -113,7 +114,8 @@ void MotionCheck::set_pose(FrameId frame, const SE3& camera_from_world) {
 
 void MotionCheck::forget_poses() { poses_.clear(); }
 
-CameraMotion MotionCheck::find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks) {
+CameraMotion MotionCheck::find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks,
+                                             const cv::Mat& suspect) {
   CameraMotion motion;
   if (poses_.empty()) return motion;
   const Pose& previous = poses_.back();
@@ -132,7 +134,10 @@ CameraMotion MotionCheck::find_camera_motion(const MotionFrame& frame, std::span
     if (memory != moved_.end()) continue;
     // Depth at an edge belongs to one side or the other: such a pair is not asked, unless hardly anything else is
     // there.
-    const double weight = before.depth_spread_m > 0.05 * before.depth_m ? 0.2 : 1;
+    double weight = before.depth_spread_m > 0.05 * before.depth_m ? 0.2 : 1;
+    if (!suspect.empty() &&
+        suspect.at<std::uint8_t>(static_cast<int>(before.pixel.y()), static_cast<int>(before.pixel.x())))
+      weight *= kSuspectWeight;
     pairs.push_back({before.ideal.cast<double>(), now.ideal.cast<double>(), before.depth_m, now.depth_m, weight});
   }
   return estimate_camera_motion(pairs, camera_, frame.cur_from_prev, camera_options_);
@@ -159,9 +164,10 @@ FundamentalEstimate MotionCheck::find_fundamental(std::span<const FlowTrack> tra
   return estimate_fundamental(from, to, fundamental_options_);
 }
 
-MotionCheckResult MotionCheck::step(const MotionFrame& frame, std::span<const FlowTrack> tracks) {
+MotionCheckResult MotionCheck::step(const MotionFrame& frame, std::span<const FlowTrack> tracks,
+                                    const cv::Mat& suspect) {
   MotionCheckResult result;
-  result.camera = find_camera_motion(frame, tracks);
+  result.camera = find_camera_motion(frame, tracks, suspect);
   add_pose(frame, result.camera);
   // As long a way as most tracks have: parallax grows with it.
   std::vector<int> ages;

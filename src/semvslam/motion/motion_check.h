@@ -83,7 +83,9 @@ class MotionCheck {
   /// @param tracks as they stand after this frame. frame.camera_from_world is taken as the camera's pose if it is
   /// there; otherwise the motion since the frame before is estimated from the tracks outside frame.excluded, with
   /// frame.cur_from_prev as a hint.
-  MotionCheckResult step(const MotionFrame& frame, std::span<const FlowTrack> tracks);
+  /// @param suspect CV_8UC1 in the frame before, non-zero = a thing that moved; tracks from there say little about the
+  /// camera. Empty = none known.
+  MotionCheckResult step(const MotionFrame& frame, std::span<const FlowTrack> tracks, const cv::Mat& suspect = {});
 
   /// Better poses for frames already seen, as tracking finds them; frames no longer held are ignored. All poses must be
   /// in one world: after a jump (loop closing, relocalisation) call forget_poses.
@@ -103,7 +105,7 @@ class MotionCheck {
     int in_a_row = 0;      // frames that it moved
   };
   const Pose* pose_of(FrameId frame) const;
-  CameraMotion find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks);
+  CameraMotion find_camera_motion(const MotionFrame& frame, std::span<const FlowTrack> tracks, const cv::Mat& suspect);
   void add_pose(const MotionFrame& frame, const CameraMotion& motion);
   FundamentalEstimate find_fundamental(std::span<const FlowTrack> tracks, int age) const;
   TrackMotion measure(const FlowTrack& track, const MotionCheckResult& result) const;

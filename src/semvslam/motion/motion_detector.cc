@@ -40,7 +40,7 @@ MotionResult MotionDetector::step(const MotionFrame& frame) {
   tracks_.step(frame);
   for (const LostTrack& lost : tracks_.lost()) ++result.lost[static_cast<std::size_t>(lost.reason)];
   result.flow_ms = ms_since(clock);
-  result.check = check_.step(frame, tracks_.tracks());
+  result.check = check_.step(frame, tracks_.tracks(), regions_.mask());
   result.check_ms = ms_since(clock);
   regions_.step(frame, tracks_.tracks(), result.check);
   result.mask = regions_.mask();

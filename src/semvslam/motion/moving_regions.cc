@@ -118,6 +118,16 @@ bool MovingRegions::belong_together(const Evidence& a, const Evidence& b) const 
   return true;
 }
 
+bool MovingRegions::move_alike(std::span<const Evidence> evidence) const {
+  constexpr float kUnlike = 0.5f;  // of the mean speed
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  for (const Evidence& e : evidence) mean += e.velocity_m_s / static_cast<float>(evidence.size());
+  const auto alike = std::count_if(evidence.begin(), evidence.end(), [&](const Evidence& e) {
+    return (e.velocity_m_s - mean).norm() < kUnlike * mean.norm();
+  });
+  return 3 * alike >= 2 * static_cast<std::ptrdiff_t>(evidence.size());
+}
+
 bool MovingRegions::rests(std::span<const Evidence> evidence, std::span<const FlowTrack> tracks,
                           const MotionCheckResult& motion) const {
   constexpr float kAroundPx = 8;
@@ -185,6 +195,7 @@ void MovingRegions::assign(const MotionFrame& frame, std::span<const FlowTrack> 
     // Reflections on glossy things move as well, but no surface with them.
     const double needed = options_.min_tracks * (options_.depth_seeds && seeds < kLeastSeeds ? kTracksAlone : 1);
     const bool enough = moving > 0 ? moving + seeds / kSeedsPerTrack >= needed : seeds >= kSeedsAlone;
+    if (options_.depth_seeds && seeds < kLeastSeeds && !move_alike(fresh.fresh)) continue;
     if (!enough || rests(fresh.fresh, tracks, motion)) continue;
     fresh.region.id = RegionId(next_id_++);
     fresh.region.moved_at_s = frame.time_s;

@@ -81,6 +81,7 @@ class MovingRegions {
   bool is_unclaimed(const MotionFrame& frame, const cv::Point2f& pixel) const;
   bool belong_together(const Evidence& a, const Evidence& b) const;
   void carry(const MotionFrame& frame, const CellGrid& before, const MotionCheckResult& motion);
+  bool move_alike(std::span<const Evidence> evidence) const;
   bool rests(std::span<const Evidence> evidence, std::span<const FlowTrack> tracks,
              const MotionCheckResult& motion) const;
   void assign(const MotionFrame& frame, std::span<const FlowTrack> tracks, const MotionCheckResult& motion,
