@@ -35,7 +35,7 @@ ALLOWED = {
 
 # library -> (how its headers begin, modules whose sources may include them). `map` and `pipeline` see frames through data.
 FOREIGN = {
-    "OpenCV": (re.compile(r"opencv2/"), {"data", "feature", "render", "motion", "semantic", "dynamic", "tracking", "map"}),
+    "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "tracking", "map"}),
     "Ceres": (re.compile(r"ceres/"), {"solve"}),
     "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),

@@ -9,6 +9,7 @@
 #include "semvslam/base/result.h"
 #include "semvslam/base/time_stamp.h"
 #include "semvslam/geometry/camera.h"
+#include "semvslam/geometry/depth_image.h"
 #include "semvslam/geometry/se3.h"
 
 namespace semvslam {
@@ -22,13 +23,6 @@ struct RgbdFrame {
   cv::Mat depth;   // CV_16UC1 in units of Camera::depth_units_per_m, or CV_32FC1 in metres; 0 or NaN = no measurement
   cv::Mat mask;    // optional CV_8UC1, non-zero = pixel of something that may move; empty = unknown
 };
-
-/// Depth in metres at an integer pixel; 0 where nothing was measured. (x, y) must lie inside.
-inline float depth_at_m(const cv::Mat& depth, float metres_per_unit, int x, int y) {
-  if (depth.type() == CV_16UC1) return static_cast<float>(depth.at<std::uint16_t>(y, x)) * metres_per_unit;
-  const float d = depth.at<float>(y, x);
-  return d > 0.f && d < 1e6f ? d : 0.f;  // NaN fails both
-}
 
 /// Where frames come from: a recording, a renderer, a camera.
 class FrameSource {

@@ -3,25 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "semvslam/geometry/depth_image.h"
+
 namespace semvslam {
 namespace {
 
-float metres(const cv::Mat& depth, float metres_per_unit, int x, int y) {
-  if (depth.type() == CV_16UC1) return static_cast<float>(depth.at<std::uint16_t>(y, x)) * metres_per_unit;
-  const float d = depth.at<float>(y, x);
-  return d > 0.f && d < 1e6f ? d : 0.f;  // NaN fails both comparisons
-}
-
 // 0 unless the centre was measured and what was measured around it lies on the same smooth surface.
 float smooth_depth_m(const cv::Mat& depth, float metres_per_unit, float edge_ratio, int radius, int x, int y) {
-  const float centre = metres(depth, metres_per_unit, x, y);
+  const float centre = depth_at_m(depth, metres_per_unit, x, y);
   if (centre <= 0.f) return 0.f;
   float low = centre, high = centre;
   for (int dy = -radius; dy <= radius; ++dy) {
     for (int dx = -radius; dx <= radius; ++dx) {
       const int nx = x + dx, ny = y + dy;
       if (nx < 0 || ny < 0 || nx >= depth.cols || ny >= depth.rows) continue;
-      const float d = metres(depth, metres_per_unit, nx, ny);
+      const float d = depth_at_m(depth, metres_per_unit, nx, ny);
       if (d <= 0.f) continue;
       low = std::min(low, d);
       high = std::max(high, d);
@@ -89,6 +85,26 @@ void measure(const ObservationModel& model, const cv::Mat& depth, FrameFeatures&
     const float d = smooth_depth_m(depth, metres_per_unit, static_cast<float>(noise.depth_edge_ratio), radius, x, y);
     if (d >= noise.min_depth_m && d <= noise.max_depth_m) features.depth_m[i] = d;
   }
+  features.grid.build(features.x_px, features.y_px, camera.width_px, camera.height_px);
+}
+
+void keep_features(const std::vector<std::uint8_t>& keep, const Camera& camera, FrameFeatures& features) {
+  if (std::find(keep.begin(), keep.end(), std::uint8_t{0}) == keep.end()) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (keep[i] == 0) continue;
+    features.orb.keypoints[kept] = features.orb.keypoints[i];
+    features.orb.descriptors[kept] = features.orb.descriptors[i];
+    features.x_px[kept] = features.x_px[i];
+    features.y_px[kept] = features.y_px[i];
+    features.depth_m[kept] = features.depth_m[i];
+    ++kept;
+  }
+  features.orb.keypoints.resize(kept);
+  features.orb.descriptors.resize(kept);
+  features.x_px.resize(kept);
+  features.y_px.resize(kept);
+  features.depth_m.resize(kept);
   features.grid.build(features.x_px, features.y_px, camera.width_px, camera.height_px);
 }
 

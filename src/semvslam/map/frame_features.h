@@ -70,4 +70,7 @@ class ObservationModel {
 /// measured.
 void measure(const ObservationModel& model, const cv::Mat& depth, FrameFeatures& features);
 
+/// Drops the features i with keep[i] == 0; the order of the others stays. @param keep one per feature.
+void keep_features(const std::vector<std::uint8_t>& keep, const Camera& camera, FrameFeatures& features);
+
 }  // namespace semvslam
