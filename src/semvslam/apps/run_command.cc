@@ -13,28 +13,42 @@
 namespace semvslam {
 namespace {
 
+constexpr const char* kDefaultMode = "full";
+
 struct RunArguments {
-  std::string sequence, out, config_file, mode, camera, preset, masks;
+  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames;
   std::vector<std::string> assignments;
   std::uint64_t max_frames = 0;
   bool deterministic = false, realtime = false, quiet = false;
 };
 
-/// The file first, then --set, then the options that have names of their own: the more special wins.
-Status fill_config(const RunArguments& a, Config& config) {
+/// Applies the file, then --set, then the options that have names of their own: the more special wins.
+Status assign_values(const RunArguments& a, const std::string& file_text, Config& config) {
   ConfigSchema schema = config.schema();
-  if (!a.config_file.empty()) {
-    const Result<std::string> text = read_text_file(a.config_file, 1 << 20);
-    if (!text) return text.error();
-    if (Status status = schema.load_yaml(*text, a.config_file); !status) return status;
-  }
+  if (!a.config_file.empty())
+    if (Status status = schema.load_yaml(file_text, a.config_file); !status) return status;
   for (const std::string& assignment : a.assignments)
     if (Status status = schema.set(assignment); !status) return status;
   if (!a.mode.empty())
     if (Status status = schema.set("mode=" + a.mode); !status) return status;
   if (a.deterministic) config.deterministic = true;
   if (a.realtime) config.realtime = true;
-  return Status::success();
+  return config.check();
+}
+
+/// The mode's preset, and what the user set on top of it. The mode itself may stand in any of the user's places.
+Status fill_config(const RunArguments& a, Config& config) {
+  std::string file_text;
+  if (!a.config_file.empty()) {
+    Result<std::string> text = read_text_file(a.config_file, 1 << 20);
+    if (!text) return text.error();
+    file_text = std::move(*text);
+  }
+  Config wanted;
+  wanted.mode = kDefaultMode;
+  if (Status status = assign_values(a, file_text, wanted); !status) return status;
+  if (Status status = config.apply_mode(wanted.mode); !status) return status;
+  return assign_values(a, file_text, config);
 }
 
 Result<int> run(const RunArguments& a) {
@@ -44,6 +58,7 @@ Result<int> run(const RunArguments& a) {
   sequence_options.camera_file = a.camera;
   sequence_options.camera_preset = a.preset;
   sequence_options.mask_folder = a.masks;
+  sequence_options.want_colour = config.needs_segmentation() && config.segment.source == "network";
   if (!a.quiet)
     sequence_options.on_warning = [](const std::string& line) { fmt::print(stderr, "semvslam: warning: {}\n", line); };
   Result<std::unique_ptr<FrameSource>> source = open_sequence(a.sequence, sequence_options);
@@ -52,6 +67,7 @@ Result<int> run(const RunArguments& a) {
   RunOptions options;
   options.out = a.out;
   options.quiet = a.quiet;
+  options.debug_frames = a.debug_frames;
   if (a.max_frames > 0) options.max_frames = a.max_frames;
   const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
   if (!outcome) return outcome.error();
@@ -68,10 +84,13 @@ CommandHandler setup_run(CLI::App& parser) {
       ->required();
   parser.add_option("--config", a->config_file, "YAML file with values ('semvslam config' shows all of them)");
   parser.add_option("--set", a->assignments, "one value, key=value; may be repeated")->allow_extra_args(false);
-  parser.add_option("--mode", a->mode, "preset: which evidence of motion is used (the key 'mode')");
+  parser.add_option("--mode", a->mode,
+                    "which evidence of motion is used (the key 'mode'): orb, boxes, masks, masks+repair, masks+motion, "
+                    "motion or full (default)");
   parser.add_option("--camera", a->camera, "camera YAML, where the recording has none or another one is wanted");
   parser.add_option("--camera-preset", a->preset, "built-in camera, e.g. tum_fr3");
   parser.add_option("--masks", a->masks, "folder with one PNG per frame, non-zero = pixel of something that may move");
+  parser.add_option("--debug-frames", a->debug_frames, "folder for a picture per frame of what was taken for moving");
   parser.add_option("--max-frames", a->max_frames, "stop after this many frames")->check(CLI::PositiveNumber);
   parser.add_flag("--deterministic", a->deterministic, "two runs give the same bytes (slower: one thread)");
   parser.add_flag("--realtime", a->realtime, "keep the pace of the stamps, drop frames that come too late");

@@ -13,12 +13,16 @@
 #include "semvslam/base/process_stats.h"
 #include "semvslam/base/stage_timer.h"
 #include "semvslam/data/prefetch.h"
+#include "semvslam/dynamic/dynamic_overlay.h"
+#include "semvslam/pipeline/segment_ahead.h"
+#include "semvslam/semantic/segmentation_files.h"
 
 namespace semvslam {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::size_t kFramesAhead = 6;
+constexpr std::size_t kMasksAhead = 2;
 constexpr std::uint64_t kSkipsShown = 3;  // on the terminal; all are in run.log
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -87,11 +91,50 @@ class Pace {
   Clock::time_point start_;
 };
 
+/// Writes what the system has to say to the log and the terminal.
+class NoticeSink final : public Sink {
+ public:
+  explicit NoticeSink(RunOutput& output) : output_(output) {}
+  void on_frame(const RgbdFrame&, const TrackResult&) override {}
+  void on_notice(const std::string& line) override {
+    output_.log("warning", line);
+    fmt::print(stderr, "semvslam: warning: {}\n", line);
+  }
+
+ private:
+  RunOutput& output_;
+};
+
+/// Writes a picture per frame of what the policy made of it.
+class DebugFrameSink final : public Sink {
+ public:
+  DebugFrameSink(std::filesystem::path folder, RunOutput& output) : folder_(std::move(folder)), output_(output) {}
+  void on_frame(const RgbdFrame& frame, const TrackResult& result) override {
+    const cv::Mat picture = draw_dynamic(frame, *result.dynamic, state_name(result.state));
+    const Status status = write_picture(folder_ / fmt::format("{:06}.png", frame.id.value), picture);
+    if (!status && !failed_) output_.log("warning", status.error().message);
+    failed_ = !status;
+  }
+
+ private:
+  const std::filesystem::path folder_;
+  RunOutput& output_;
+  bool failed_ = false;
+};
+
+/// Every frame of a recording gets its own mask, made while the frames before are tracked. Where the order of all steps
+/// is fixed, or no mask may be waited for, the system segments by itself.
+SegmentAhead::Segment segment_ahead_of(const Config& config, Slam& slam) {
+  if (!config.needs_segmentation() || config.deterministic || config.realtime) return {};
+  return [&slam](const RgbdFrame& frame) { return slam.segment(frame); };
+}
+
 class Session {
  public:
   Session(FrameSource& source, const Config& config, Slam& slam, RunOutput& output, const RunOptions& options,
           RunRecord record)
       : source_(source),
+        segmented_(source, segment_ahead_of(config, slam), kMasksAhead),
         slam_(slam),
         output_(output),
         options_(options),
@@ -110,11 +153,12 @@ class Session {
     const std::uint64_t all = *source.size();
     return options.max_frames ? std::min(all, *options.max_frames) : all;
   }
-  Status use(const RgbdFrame& frame);
+  Status use(SegmentedFrame frame);
   void skip(const Error& error);
   void note_state(const TrackResult& result);
 
   FrameSource& source_;
+  SegmentAhead segmented_;
   Slam& slam_;
   RunOutput& output_;
   const RunOptions& options_;
@@ -152,8 +196,9 @@ void Session::note_state(const TrackResult& result) {
   state_ = result.state;
 }
 
-Status Session::use(const RgbdFrame& frame) {
-  const Result<TrackResult> result = slam_.process(frame);
+Status Session::use(SegmentedFrame next) {
+  const Result<TrackResult> result =
+      next.has_segmentation ? slam_.process(next.frame, std::move(next.segmentation)) : slam_.process(next.frame);
   if (!result) {
     if (result.error().code == ErrorCode::kInternal) return result.error();
     skip(result.error());
@@ -172,18 +217,18 @@ Status Session::run() {
   Checkpoints checkpoints(slam_, output_);
   start_ = Clock::now();
   while (InterruptGuard::received() == 0 && (!options_.max_frames || record_.read < *options_.max_frames)) {
-    Result<std::optional<RgbdFrame>> next = [&] {
+    Result<std::optional<SegmentedFrame>> next = [&] {
       const auto timing = input_.time();
-      return source_.next();
+      return segmented_.next();
     }();
-    if (!next && source_.fatal()) return next.error();
+    if (!next && segmented_.fatal()) return next.error();
     if (next && !*next) break;
     ++record_.read;
     if (!next) {
       skip(next.error());
-    } else if (realtime_ && !pace.keep((*next)->stamp)) {
+    } else if (realtime_ && !pace.keep((*next)->frame.stamp)) {
       ++record_.dropped;
-    } else if (const Status status = use(**next); !status) {
+    } else if (const Status status = use(std::move(**next)); !status) {
       return status;
     }
     progress_.update(record_.read, state_name(state_));
@@ -212,6 +257,15 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   if (!output) return output.error();
   Result<std::unique_ptr<Slam>> slam = Slam::create(config, source->camera());
   if (!slam) return slam.error();
+  (*slam)->add_sink(std::make_shared<NoticeSink>(*output));
+  if (!options.debug_frames.empty()) {
+    std::error_code code;
+    std::filesystem::create_directories(options.debug_frames, code);
+    if (code)
+      return Error{ErrorCode::kIo,
+                   fmt::format("{}: cannot make the folder ({})", options.debug_frames.string(), code.message())};
+    (*slam)->add_sink(std::make_shared<DebugFrameSink>(options.debug_frames, *output));
+  }
   if (const Status status = output->write("config.yaml", config.schema().dump_yaml()); !status) return status.error();
   RunRecord record;
   record.sequence = source->description();

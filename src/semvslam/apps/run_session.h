@@ -17,6 +17,7 @@ struct RunOptions {
   std::filesystem::path out;
   std::optional<std::uint64_t> max_frames;
   bool quiet = false;
+  std::filesystem::path debug_frames;  // folder for a picture per frame of what was taken for moving; empty = none
 };
 
 /// How a run ended; everything computed is in the output folder.

@@ -17,6 +17,31 @@ double per_frame(double seconds, std::uint64_t frames) {
   return frames == 0 ? 0 : seconds * 1e3 / static_cast<double>(frames);
 }
 
+template <typename Name, std::size_t N>
+Json counts(const std::array<std::uint64_t, N>& values) {
+  Json json = Json::object();
+  for (std::size_t i = 0; i < N; ++i) json[std::string(to_string(static_cast<Name>(i)))] = values[i];
+  return json;
+}
+
+Json dynamic_to_json(const DynamicTotals& d, std::uint64_t frames) {
+  std::uint64_t masked = 0;
+  for (std::size_t i = 1; i < kMaskSources; ++i) masked += d.mask_sources[i];
+  const auto mean = [](double sum, std::uint64_t n) { return n == 0 ? 0.0 : sum / static_cast<double>(n); };
+  return {{"features", counts<FeatureVerdict>(d.verdicts)},
+          {"reasons", counts<FeatureReason>(d.reasons)},
+          {"track_reasons", counts<MotionReason>(d.track_reasons)},
+          {"mask_sources", counts<MaskSource>(d.mask_sources)},
+          {"segmentation_states", counts<SegmentationState>(d.segmentation_states)},
+          {"fail_open", counts<FailOpen>(d.fail_opens)},
+          {"restored_instances", d.restored_instances},
+          {"extended_instances", d.extended_instances},
+          {"moving_instances", d.moving_instances},
+          {"moving_regions", d.moving_regions},
+          {"mask_age_frames", mean(static_cast<double>(d.mask_age_frames), masked)},
+          {"masked_share", mean(d.masked_share, frames)}};
+}
+
 }  // namespace
 
 std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) {
@@ -38,6 +63,8 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                      {"tracked_share", share},
                      {"key_frames", slam.key_frames},
                      {"landmarks", slam.landmarks},
+                     {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
+                     {"notices", slam.notices},
                      {"stages_ms", stages},
                      {"start_up_s", run.start_up_s},
                      {"wall_s", run.wall_s},
@@ -54,7 +81,7 @@ std::string format_summary(const RunRecord& run, const SlamStatistics& slam) {
   if (run.dropped > 0) out += fmt::format(", {} dropped to keep pace", run.dropped);
   out += fmt::format("; {} key frames, {} landmarks\n", slam.key_frames, slam.landmarks);
   for (const StageSummary& stage : slam.stages)
-    if (stage.name == "tracking" || stage.name == "mapping")
+    if (stage.name == "tracking" || stage.name == "mapping" || stage.name == "segment")
       out += fmt::format("{:<9} mean {:.2f}  median {:.2f}  p95 {:.2f}  max {:.2f} ms\n", stage.name, stage.mean_ms,
                          stage.median_ms, stage.p95_ms, stage.max_ms);
   out += fmt::format("wall {:.2f} s, CPU {:.2f} s ({:.2f} ms per frame), peak memory {:.0f} MB\n", run.wall_s,

@@ -4,10 +4,14 @@
 #include <chrono>
 #include <unordered_set>
 
+#include "semvslam/map/landmark_view.h"
+
 namespace semvslam {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+constexpr double kMinViewCosine = 0.5;  // of the angle between the views that a landmark is fused from
 
 double lap_ms(Clock::time_point& start) {
   const Clock::time_point now = Clock::now();
@@ -83,6 +87,15 @@ void Mapper::cull_landmarks(KeyFrameId newest) {
   young_.resize(kept);
 }
 
+void Mapper::count_use(LandmarkId id, int visible, int found, int seen_through) {
+  const LandmarkId landmark = map_.resolve(id);
+  if (!landmark.valid()) return;
+  if (seen_through >= options_.seen_through && seen_through > found)
+    map_.remove_landmark(landmark);
+  else
+    map_.count_visible(landmark, visible, found);
+}
+
 std::vector<KeyFrameId> Mapper::fusion_partners(KeyFrameId id) const {
   std::vector<KeyFrameId> partners;
   for (const Covisible& c : map_.covisible(id, options_.min_shared)) {
@@ -120,7 +133,7 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
   const FrameFeatures& features = *key_frame.features;
   const ObservationModel& model = map_.model();
   const Camera& camera = model.camera();
-  const Eigen::Vector3d centre = key_frame.camera_from_world.inverse().translation();
+  const LandmarkViewer viewer(model, key_frame.camera_from_world, kMinViewCosine);
   std::unordered_set<LandmarkId> seen(key_frame.landmarks.begin(), key_frame.landmarks.end());
   std::vector<LandmarkId> sources;
   std::vector<Eigen::Vector3d> in_camera;
@@ -128,20 +141,14 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
   for (const LandmarkId id : landmarks) {
     const Landmark* landmark = map_.landmark(id);
     if (landmark == nullptr || seen.contains(id)) continue;
-    const Eigen::Vector3d p = key_frame.camera_from_world * landmark->position;
-    if (p.z() < 0.05) continue;
-    const Eigen::Vector2d pixel = camera.project(p);
-    if (pixel.x() < 0 || pixel.y() < 0 || pixel.x() >= camera.width_px || pixel.y() >= camera.height_px) continue;
-    const Eigen::Vector3d ray = landmark->position - centre;
-    const auto distance = static_cast<float>(ray.norm());
-    if (distance < 0.8f * landmark->min_distance_m || distance > 1.2f * landmark->max_distance_m) continue;
-    if (ray.dot(landmark->normal.cast<double>()) < 0.5 * distance) continue;
-    const int level = model.predict_level(landmark->max_distance_m / distance);
-    const float radius = static_cast<float>(options_.fuse_radius_px) * model.level_scale(level);
-    queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, level - 1, level + 1,
-                        landmark->descriptor, -1.f});
+    const std::optional<LandmarkView> view =
+        viewer.view({landmark->position, landmark->normal, landmark->min_distance_m, landmark->max_distance_m});
+    if (!view) continue;
+    const float radius = static_cast<float>(options_.fuse_radius_px) * model.level_scale(view->level);
+    queries_.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
+                        view->level - 1, view->level + 1, landmark->descriptor, -1.f});
     sources.push_back(id);
-    in_camera.push_back(p);
+    in_camera.push_back(view->in_camera);
   }
   match_projected(queries_, features.orb, features.grid, {.max_distance = 50, .ratio = 1.f, .check_rotation = false},
                   matches_);

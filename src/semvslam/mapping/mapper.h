@@ -21,6 +21,7 @@ struct MappingOptions {
   int bundle_fixed_key_frames = 30;   // that hold it in place
   int final_bundles = 2;         // full bundle adjustments when the run ends; the second without the first's outliers
   int min_shared = 15;           // landmarks that make two key frames neighbours
+  int seen_through = 3;          // frames of that, and more than it was found in: the landmark's place is empty now
   double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others
   LocalMapOptions local_map;
 };
@@ -49,7 +50,9 @@ class Mapper {
   std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});
   /// Full bundle adjustment over every key frame and landmark.
   void adjust_all(std::stop_token stop = {});
-  void count_visible(LandmarkId id, int visible, int found) { map_.count_visible(id, visible, found); }
+  /// How a landmark fared in the frames since the last key frame: in how many it should have been seen, was found, and
+  /// was looked through by the depth image. One that was mostly looked through is gone and removed.
+  void count_use(LandmarkId id, int visible, int found, int seen_through);
 
   const Map& map() const { return map_; }
   const MappingTimes& times() const { return times_; }

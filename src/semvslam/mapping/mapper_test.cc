@@ -122,9 +122,20 @@ TEST_F(MapperTest, YoungLandmarksThatAreSeldomFoundGo) {
   (void)mapper.step(view(0, truth(0), {}));
   const std::vector<LandmarkId> ids = landmarks_by_point();
   const LandmarkId victim = ids[point_of_feature.front()];
-  mapper.count_visible(victim, 20, 1);
+  mapper.count_use(victim, 20, 1, 0);
   (void)mapper.step(view(1, truth(1), ids));
   EXPECT_EQ(mapper.map().landmark(victim), nullptr);
+  expect_consistent();
+}
+
+TEST_F(MapperTest, LandmarksWhoseCarrierHasGoneGo) {
+  (void)mapper.step(view(0, truth(0), {}));
+  const std::vector<LandmarkId> ids = landmarks_by_point();
+  const LandmarkId gone = ids[point_of_feature[0]], still_found = ids[point_of_feature[1]];
+  mapper.count_use(gone, 0, 0, 5);
+  mapper.count_use(still_found, 0, 9, 5);
+  EXPECT_EQ(mapper.map().landmark(gone), nullptr);
+  EXPECT_NE(mapper.map().landmark(still_found), nullptr);
   expect_consistent();
 }
 

@@ -1,5 +1,7 @@
 #include "semvslam/pipeline/config.h"
 
+#include "semvslam/pipeline/presets.h"
+
 namespace semvslam {
 namespace {
 
@@ -65,6 +67,8 @@ void describe(ConfigSchema& s, MappingOptions& m) {
   s.add("mapping.bundle_fixed_key_frames", &m.bundle_fixed_key_frames, {0, 1000}, "key frames that hold it in place");
   s.add("mapping.final_bundles", &m.final_bundles, {0, 10}, "full bundle adjustments when the run ends");
   s.add("mapping.min_shared", &m.min_shared, {1, 10000}, "shared landmarks that make two key frames neighbours");
+  s.add("mapping.seen_through", &m.seen_through, {1, 100000},
+        "frames in which the depth looks through a landmark's place: it is gone");
   s.add("mapping.redundant_ratio", &m.redundant_ratio, {0.1, 1},
         "a key frame goes when this share of its landmarks is seen in three others");
   LocalMapOptions& l = m.local_map;
@@ -82,15 +86,28 @@ void describe(ConfigSchema& s, MappingOptions& m) {
 
 ConfigSchema Config::schema() {
   ConfigSchema s;
-  s.add("mode", &mode, {"orb"}, "preset: which evidence of motion is used");
+  s.add("mode", &mode, mode_names(), "preset that the other values begin with: which evidence of motion is used");
   s.add("deterministic", &deterministic, "the same steps in a fixed order on one thread: two runs give the same bytes");
-  s.add("realtime", &realtime, "never wait for mapping; a key frame it cannot take now is asked for again");
+  s.add("realtime", &realtime, "never wait, neither for a mask nor for mapping");
   s.add("mapping_queue", &mapping_queue, {1, 100}, "key frames that may wait for mapping");
   describe(s, orb);
   describe(s, noise);
   describe(s, tracking);
   describe(s, mapping);
+  segment.add_to(s);
+  dynamic.add_to(s);
+  damage.add_to(s);
   return s;
 }
+
+Status Config::apply_mode(const std::string& name) {
+  const Result<std::string_view> preset = preset_of(name);
+  if (!preset) return preset.error();
+  if (Status status = schema().load_yaml(std::string(*preset), "mode " + name); !status) return status;
+  mode = name;
+  return Status::success();
+}
+
+Status Config::check() const { return dynamic.check(); }
 
 }  // namespace semvslam

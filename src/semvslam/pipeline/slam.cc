@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <exception>
 #include <mutex>
 #include <thread>
 
 #include "semvslam/base/bounded_queue.h"
+#include "semvslam/pipeline/segmentation_stage.h"
 
 namespace semvslam {
 
@@ -17,7 +19,7 @@ struct Slam::Impl {
   Impl(const Config& c, const Camera& camera)
       : config(c),
         model(std::make_shared<ObservationModel>(camera, c.noise, level_scales(c.orb))),
-        tracker(c.tracking, c.orb, model),
+        tracker(c.tracking, c.orb, c.dynamic, model),
         mapper(c.mapping, model),
         requests(static_cast<std::size_t>(c.mapping_queue)) {}
 
@@ -33,8 +35,13 @@ struct Slam::Impl {
     published.wait(lock, [&] { return newest != nullptr || failure != nullptr; });
   }
   Status failure_status() const;
+  Status check_input(const RgbdFrame& frame) const;
+  std::optional<Segmentation> mask_for(const RgbdFrame& frame);
+  void note(const std::string& line);
+  TrackResult track(const RgbdFrame& frame, const Segmentation* segmentation);
 
   const Config config;
+  std::unique_ptr<SegmentationStage> segmentation;  // null: no masks wanted, or none to be had
   const std::shared_ptr<const ObservationModel> model;
   Tracker tracker;
   StageTimers timers;
@@ -57,6 +64,8 @@ struct Slam::Impl {
   mutable std::mutex record_mutex;
   std::vector<Record> records;
   std::uint64_t frames = 0, lost = 0;
+  DynamicTotals dynamic;
+  std::vector<std::string> notices;
   FrameId next_frame{0};
   bool finished = false;
 };
@@ -69,7 +78,8 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
     if (request.reference.valid())
       key_frame.camera_from_world =
           request.camera_from_reference * mapper.map().camera_from_world(request.reference).value();
-    for (const LandmarkUse& use : request.uses) mapper.count_visible(use.landmark, use.visible, use.found);
+    for (const LandmarkUse& use : request.uses)
+      mapper.count_use(use.landmark, use.visible, use.found, use.seen_through);
     local = mapper.step(key_frame);
     const MappingTimes& t = mapper.times();
     timers["mapping.create"].add_ms(t.create_ms);
@@ -129,39 +139,105 @@ Slam::~Slam() {
 
 Result<std::unique_ptr<Slam>> Slam::create(const Config& config, const Camera& camera) {
   if (Status s = camera.check(); !s) return s.error();
-  return std::unique_ptr<Slam>(new Slam(std::make_unique<Impl>(config, camera)));
+  if (Status s = config.check(); !s) return s.error();
+  Config used = config;
+  std::unique_ptr<SegmentationStage> segmentation;
+  std::string notice;
+  if (config.needs_segmentation()) {
+    Result<std::unique_ptr<SegmentationStage>> made = SegmentationStage::create(config);
+    if (made) {
+      segmentation = std::move(*made);
+    } else {
+      notice = made.error().message + "; going on without masks, by motion consistency";
+      used.dynamic.motion = true;
+    }
+  }
+  std::unique_ptr<Slam> slam(new Slam(std::make_unique<Impl>(used, camera)));
+  slam->impl_->segmentation = std::move(segmentation);
+  if (!notice.empty()) slam->impl_->note(notice);
+  return slam;
 }
 
-void Slam::add_sink(std::shared_ptr<Sink> sink) { impl_->sinks.push_back(std::move(sink)); }
+void Slam::add_sink(std::shared_ptr<Sink> sink) {
+  for (const std::string& line : impl_->notices) sink->on_notice(line);
+  impl_->sinks.push_back(std::move(sink));
+}
 
-Result<TrackResult> Slam::process(const RgbdFrame& input) {
-  Impl& s = *impl_;
-  const Camera& camera = s.model->camera();
-  const cv::Size size(camera.width_px, camera.height_px);
+void Slam::Impl::note(const std::string& line) {
+  {
+    std::lock_guard lock(record_mutex);
+    if (std::find(notices.begin(), notices.end(), line) != notices.end()) return;
+    notices.push_back(line);
+  }
+  for (const auto& sink : sinks) sink->on_notice(line);
+}
+
+Status Slam::Impl::check_input(const RgbdFrame& frame) const {
+  const cv::Size size(model->camera().width_px, model->camera().height_px);
   const auto invalid = [&](const std::string& what) {
-    return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", s.next_frame.value, what)};
+    return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", next_frame.value, what)};
   };
-  if (input.gray.type() != CV_8UC1 || input.gray.size() != size)
+  if (frame.gray.type() != CV_8UC1 || frame.gray.size() != size)
     return invalid(fmt::format("the grey image must be 8-bit and {}x{}, it is {}x{}", size.width, size.height,
-                               input.gray.cols, input.gray.rows));
-  if (!input.depth.empty() &&
-      (input.depth.size() != size || (input.depth.type() != CV_16UC1 && input.depth.type() != CV_32FC1)))
+                               frame.gray.cols, frame.gray.rows));
+  if (!frame.depth.empty() &&
+      (frame.depth.size() != size || (frame.depth.type() != CV_16UC1 && frame.depth.type() != CV_32FC1)))
     return invalid(fmt::format("the depth image must be 16-bit or float and {}x{}, it is {}x{}", size.width,
-                               size.height, input.depth.cols, input.depth.rows));
-  if (!input.mask.empty() && (input.mask.size() != size || input.mask.type() != CV_8UC1))
+                               size.height, frame.depth.cols, frame.depth.rows));
+  if (!frame.mask.empty() && (frame.mask.size() != size || frame.mask.type() != CV_8UC1))
     return invalid(fmt::format("the mask must be 8-bit and {}x{}, it is {}x{}", size.width, size.height,
-                               input.mask.cols, input.mask.rows));
-  if (Status status = s.failure_status(); !status) return status.error();
+                               frame.mask.cols, frame.mask.rows));
+  return Status::success();
+}
 
-  RgbdFrame frame = input;
-  frame.id = s.next_frame;
+std::optional<Segmentation> Slam::Impl::mask_for(const RgbdFrame& frame) {
+  if (!segmentation) return std::nullopt;
+  if (!config.realtime) return segmentation->segment(frame);
+  segmentation->offer(frame);
+  return segmentation->newest();
+}
+
+std::optional<Segmentation> Slam::segment(const RgbdFrame& frame) {
+  return impl_->segmentation ? impl_->segmentation->segment(frame) : std::nullopt;
+}
+
+Result<TrackResult> Slam::process(const RgbdFrame& frame) {
+  if (Status status = impl_->check_input(frame); !status) return status.error();
+  RgbdFrame named = frame;
+  named.id = impl_->next_frame;
+  return process_named(named, impl_->mask_for(named));
+}
+
+Result<TrackResult> Slam::process(const RgbdFrame& frame, std::optional<Segmentation> segmentation) {
+  if (Status status = impl_->check_input(frame); !status) return status.error();
+  RgbdFrame named = frame;
+  named.id = impl_->next_frame;
+  // The caller numbers its frames as it likes; a frame that was refused has no number here.
+  if (segmentation) segmentation->frame = named.id;
+  return process_named(named, std::move(segmentation));
+}
+
+Result<TrackResult> Slam::process_named(const RgbdFrame& frame, std::optional<Segmentation> segmentation) {
+  Impl& s = *impl_;
+  if (Status status = s.failure_status(); !status) return status.error();
   s.next_frame.value += 1;
-  const bool may_request = !s.config.realtime || s.requests.size() < static_cast<std::size_t>(s.config.mapping_queue);
-  Tracker::Output tracked = s.tracker.step(frame, s.newest_map(), may_request);
-  s.timers["tracking.extract"].add_ms(tracked.times.extract_ms);
-  s.timers["tracking.motion"].add_ms(tracked.times.motion_ms);
-  s.timers["tracking.local_map"].add_ms(tracked.times.local_map_ms);
-  s.timers["tracking"].add_ms(tracked.times.total_ms);
+  if (s.segmentation) {
+    if (Status status = s.segmentation->status(); !status) {
+      s.note(status.error().message + "; going on without masks, by motion consistency");
+      s.tracker.use_motion();
+    }
+  }
+  return s.track(frame, segmentation ? &*segmentation : nullptr);
+}
+
+TrackResult Slam::Impl::track(const RgbdFrame& frame, const Segmentation* mask) {
+  const bool may_request = !config.realtime || requests.size() < static_cast<std::size_t>(config.mapping_queue);
+  Tracker::Output tracked = tracker.step(frame, mask, newest_map(), may_request);
+  timers["tracking.extract"].add_ms(tracked.times.extract_ms);
+  timers["tracking.dynamic"].add_ms(tracked.times.dynamic_ms);
+  timers["tracking.frame"].add_ms(tracked.times.frame_ms);
+  timers["tracking.local_map"].add_ms(tracked.times.local_map_ms);
+  timers["tracking"].add_ms(tracked.times.total_ms);
 
   TrackResult result;
   result.frame = frame.id;
@@ -170,19 +246,21 @@ Result<TrackResult> Slam::process(const RgbdFrame& input) {
   result.world_from_camera = tracked.camera_from_world.inverse();
   result.inliers = tracked.inliers;
   result.is_key_frame = tracked.key_frame.has_value();
-  result.mask_source = frame.mask.empty() ? MaskSource::kNone : MaskSource::kGiven;
+  result.mask_source = tracked.dynamic->mask_source;
   result.tracking_ms = tracked.times.total_ms;
-  if (tracked.key_frame) s.submit(std::move(*tracked.key_frame));
+  result.dynamic = tracked.dynamic;
+  if (tracked.key_frame) submit(std::move(*tracked.key_frame));
   if (tracked.state == TrackingState::kTracking && !tracked.relative) {
-    if (const auto local = s.newest_map()) tracked.relative = RelativePose{local->reference, SE3()};
+    if (const auto local = newest_map()) tracked.relative = RelativePose{local->reference, SE3()};
   }
   {
-    std::lock_guard lock(s.record_mutex);
-    ++s.frames;
-    if (tracked.state == TrackingState::kLost) ++s.lost;
-    if (tracked.relative) s.records.push_back({frame.stamp, *tracked.relative});
+    std::lock_guard lock(record_mutex);
+    ++frames;
+    if (tracked.state == TrackingState::kLost) ++lost;
+    if (tracked.relative) records.push_back({frame.stamp, *tracked.relative});
+    dynamic.add(*tracked.dynamic);
   }
-  for (const auto& sink : s.sinks) sink->on_frame(frame, result);
+  for (const auto& sink : sinks) sink->on_frame(frame, result);
   return result;
 }
 
@@ -234,7 +312,11 @@ SlamStatistics Slam::statistics() const {
   statistics.lost = impl_->lost;
   statistics.key_frames = impl_->mapper.map().key_frames().size();
   statistics.landmarks = impl_->mapper.map().landmark_count();
+  statistics.dynamic = impl_->dynamic;
+  statistics.notices = impl_->notices;
   statistics.stages = impl_->timers.summaries();
+  if (impl_->segmentation)
+    for (const StageSummary& stage : impl_->segmentation->times()) statistics.stages.push_back(stage);
   return statistics;
 }
 

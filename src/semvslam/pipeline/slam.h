@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,15 +12,14 @@
 #include "semvslam/base/stage_timer.h"
 #include "semvslam/base/time_stamp.h"
 #include "semvslam/data/frame.h"
+#include "semvslam/dynamic/dynamic_record.h"
 #include "semvslam/geometry/camera.h"
 #include "semvslam/geometry/se3.h"
 #include "semvslam/pipeline/config.h"
+#include "semvslam/semantic/segmentation.h"
 #include "semvslam/tracking/messages.h"
 
 namespace semvslam {
-
-/// Where the mask that a frame was tracked with came from.
-enum class MaskSource { kNone, kGiven };
 
 /// What is known about a frame the moment it has been tracked. Mapping may improve the pose later: see
 /// Slam::trajectory().
@@ -30,12 +31,30 @@ struct TrackResult {
   int inliers = 0;        // landmarks that agree with the pose
   bool is_key_frame = false;
   MaskSource mask_source = MaskSource::kNone;
-  double tracking_ms = 0;  // frame in to pose out
+  double tracking_ms = 0;                        // frame and mask in to pose out
+  std::shared_ptr<const DynamicRecord> dynamic;  // what was taken for moving, and why
+};
+
+/// Sums over the DynamicRecords of a run.
+struct DynamicTotals {
+  std::array<std::uint64_t, 3> verdicts{};                    // features by FeatureVerdict
+  std::array<std::uint64_t, kFeatureReasons> reasons{};       // features by FeatureReason
+  std::array<std::uint64_t, kMotionReasons> track_reasons{};  // point tracks by MotionReason
+  std::array<std::uint64_t, kMaskSources> mask_sources{};     // frames by MaskSource
+  std::array<std::uint64_t, kFailOpens> fail_opens{};         // frames by FailOpen
+  std::array<std::uint64_t, 3> segmentation_states{};         // frames by SegmentationState, where there was a mask
+  std::uint64_t restored_instances = 0, extended_instances = 0, moving_instances = 0, moving_regions = 0;
+  std::uint64_t mask_age_frames = 0;  // summed over the frames with a mask
+  double masked_share = 0;            // of the image, summed over all frames
+
+  void add(const DynamicRecord& record);
 };
 
 struct SlamStatistics {
   std::uint64_t frames = 0, tracked = 0, lost = 0;
   std::uint64_t key_frames = 0, landmarks = 0;
+  DynamicTotals dynamic;
+  std::vector<std::string> notices;  // what went wrong without ending the run, each once
   std::vector<StageSummary> stages;
 };
 
@@ -44,18 +63,27 @@ class Sink {
  public:
   virtual ~Sink() = default;
   virtual void on_frame(const RgbdFrame& frame, const TrackResult& result) = 0;
+  /// Something went wrong that the run survives: one line.
+  virtual void on_notice(const std::string&) {}
 };
 
 /// The whole system. Feed frames in the order of their stamps; ask for the trajectory at any time; finish() at the end.
 /// process() and finish() belong to one thread; the queries may be called from any.
 class Slam {
  public:
-  /// @return an Error for a camera that fails Camera::check().
+  /// A network that cannot be had is no Error: motion consistency takes its place, and a notice says so.
+  /// @return an Error for a camera or a configuration that fails its check().
   static Result<std::unique_ptr<Slam>> create(const Config& config, const Camera& camera);
   ~Slam();
 
-  /// Tracks one frame. Image sizes must be the camera's: anything else is an Error and the frame is not used.
+  /// Tracks one frame. Image sizes must be the camera's: anything else is an Error and the frame is not used. Where the
+  /// configuration wants masks the frame is segmented first, on this thread; with Config::realtime beside it, and the
+  /// newest mask there is serves.
   Result<TrackResult> process(const RgbdFrame& frame);
+  /// The same for a frame that segment() was called for before, on any thread.
+  Result<TrackResult> process(const RgbdFrame& frame, std::optional<Segmentation> segmentation);
+  /// Segments a frame, for callers that read ahead (SegmentAhead). One thread at a time; not with Config::realtime.
+  std::optional<Segmentation> segment(const RgbdFrame& frame);
   void add_sink(std::shared_ptr<Sink> sink);
   /// Waits until mapping has worked off what it was given, then adjusts the whole map once more
   /// (mapping.final_bundles); further calls do nothing. @return what went wrong in any stage.
@@ -74,6 +102,7 @@ class Slam {
  private:
   struct Impl;
   explicit Slam(std::unique_ptr<Impl> impl);
+  Result<TrackResult> process_named(const RgbdFrame& frame, std::optional<Segmentation> segmentation);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -12,10 +12,11 @@ namespace semvslam {
 
 enum class TrackingState { kInitializing, kTracking, kLost };
 
-/// How a landmark fared since the last key frame: in how many frames it should have been seen, in how many it was.
+/// How a landmark fared since the last key frame: in how many frames it should have been seen, in how many it was, and
+/// in how many the depth image saw through its place: what carried it has gone.
 struct LandmarkUse {
   LandmarkId landmark;
-  int visible = 0, found = 0;
+  int visible = 0, found = 0, seen_through = 0;
 };
 
 /// What tracking asks of mapping: keep this frame.

@@ -28,28 +28,57 @@ void Tracker::Candidates::clear() {
   landmarks.clear();
 }
 
-Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, std::shared_ptr<const ObservationModel> model)
-    : options_(options), model_(std::move(model)), extractor_(orb) {}
+Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, const DynamicOptions& dynamic,
+                 std::shared_ptr<const ObservationModel> model)
+    : options_(options), model_(std::move(model)), extractor_(orb), filter_(model_->camera(), dynamic) {}
 
-Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const LocalMap> local, bool may_request) {
+Tracker::Output Tracker::step(const RgbdFrame& frame, const Segmentation* segmentation,
+                              std::shared_ptr<const LocalMap> local, bool may_request) {
   const Clock::time_point start = Clock::now();
   Output output;
-  current_ = Tracked{std::make_shared<FrameFeatures>(), {}, {}};
-  extractor_.extract(frame.gray, frame.mask, current_.features->orb);
-  measure(*model_, frame.depth, *current_.features);
-  current_.landmarks.assign(current_.features->size(), LandmarkId());
-  output.times.extract_ms = ms_since(start);
-
-  if (!local) {
-    TrackingTimes times = output.times;
-    if (!waiting_for_map_) output = initialise(frame);
-    times.total_ms = ms_since(start);
-    output.times = times;
-    return output;
+  observe(frame, segmentation, output.times);
+  if (local) {
+    adopt(std::move(local));
+    estimate(frame, may_request, output);
+  } else if (!waiting_for_map_) {
+    initialise(frame, output);
   }
+  const bool tracked = output.state == TrackingState::kTracking;
+  filter_.end(tracked ? std::optional<SE3>(output.camera_from_world) : std::nullopt, is_tracked_);
+  output.dynamic = filter_.record();
+  output.times.total_ms = ms_since(start);
+  return output;
+}
 
-  adopt(std::move(local));
-  const Clock::time_point motion_start = Clock::now();
+void Tracker::observe(const RgbdFrame& frame, const Segmentation* segmentation, TrackingTimes& times) {
+  Clock::time_point lap = Clock::now();
+  const auto take_lap = [&lap] {
+    const double ms = ms_since(lap);
+    lap = Clock::now();
+    return ms;
+  };
+  current_ = Tracked{std::make_shared<FrameFeatures>(), {}, {}};
+  FrameFeatures& features = *current_.features;
+  filter_.begin(frame, segmentation, has_velocity_ ? std::optional<SE3>(velocity_) : std::nullopt);
+  times.dynamic_ms = take_lap();
+  int with_depth = 0;
+  do {
+    extractor_.extract(frame.gray, filter_.excluded(), features.orb);
+    measure(*model_, frame.depth, features);
+    with_depth = static_cast<int>(
+        std::count_if(features.depth_m.begin(), features.depth_m.end(), [](float depth_m) { return depth_m > 0; }));
+  } while (filter_.relax(with_depth));
+  times.extract_ms = take_lap();
+  pixels_.clear();
+  for (const Keypoint& k : features.orb.keypoints) pixels_.emplace_back(k.x_px, k.y_px);
+  keep_features(filter_.judge(pixels_, features.depth_m), model_->camera(), features);
+  current_.landmarks.assign(features.size(), LandmarkId());
+  is_tracked_.assign(features.size(), 0);
+  times.dynamic_ms += take_lap();
+}
+
+void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output) {
+  const Clock::time_point start = Clock::now();
   bool ok = false;
   if (last_.features) {
     if (has_velocity_)
@@ -58,10 +87,10 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const Loca
     if (!ok) ok = track_motion(last_.camera_from_world, has_velocity_ ? 4.0 : 2.0);
   }
   if (!ok) ok = track_descriptors();
-  output.times.motion_ms = ms_since(motion_start);
+  output.times.frame_ms = ms_since(start);
 
   const Clock::time_point local_start = Clock::now();
-  output.inliers = ok ? track_local_map() : 0;
+  output.inliers = ok ? track_local_map(frame) : 0;
   ok = output.inliers >= options_.min_inliers;
   output.times.local_map_ms = ms_since(local_start);
 
@@ -80,22 +109,18 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, std::shared_ptr<const Loca
     output.camera_from_world = last_.camera_from_world;
     has_velocity_ = false;  // the last frame stays what the next one is matched against
   }
-  output.times.total_ms = ms_since(start);
-  return output;
 }
 
-Tracker::Output Tracker::initialise(const RgbdFrame& frame) {
-  Output output;
+void Tracker::initialise(const RgbdFrame& frame, Output& output) {
   int with_depth = 0;
   for (std::size_t i = 0; i < current_.features->size(); ++i) with_depth += current_.features->has_depth(i);
-  if (with_depth < options_.min_initial_points) return output;
+  if (with_depth < options_.min_initial_points) return;
   output.state = TrackingState::kTracking;
   output.inliers = with_depth;
   output.key_frame = make_request(frame);
   waiting_for_map_ = true;
   last_ = std::move(current_);
   last_relative_.reset();
-  return output;
 }
 
 void Tracker::adopt(std::shared_ptr<const LocalMap> local) {
@@ -205,29 +230,26 @@ int Tracker::estimate_pose(Candidates& candidates, SE3& camera_from_world) {
   return estimate.inliers;
 }
 
-int Tracker::track_local_map() {
-  const Camera& camera = model_->camera();
-  const SE3& pose = current_.camera_from_world;
-  const Eigen::Vector3d centre = pose.inverse().translation();
+int Tracker::track_local_map(const RgbdFrame& frame) {
+  const LandmarkViewer viewer(*model_, current_.camera_from_world, options_.min_view_cosine);
   std::vector<LandmarkId> visible, found;
   queries_.clear();
   query_source_.clear();
   for (std::size_t k = 0; k < local_->points.size(); ++k) {
     const LocalMap::Point& point = local_->points[k];
-    const Eigen::Vector3d in_camera = pose * point.position;
-    if (in_camera.z() < kNearestProjection) continue;
-    const Eigen::Vector2d pixel = camera.project(in_camera);
-    if (!inside(camera, pixel)) continue;
-    const Eigen::Vector3d ray = point.position - centre;
-    const auto distance = static_cast<float>(ray.norm());
-    if (distance < 0.8f * point.min_distance_m || distance > 1.2f * point.max_distance_m) continue;
-    const double cosine = ray.dot(point.normal.cast<double>()) / distance;
-    if (cosine < options_.min_view_cosine) continue;
-    visible.push_back(point.id);
-    const int level = model_->predict_level(point.max_distance_m / distance);
-    const float radius = static_cast<float>(options_.local_map_radius_px) * model_->level_scale(level);
-    queries_.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), radius, level - 1, level + 1,
-                        point.descriptor, -1.f});
+    const std::optional<LandmarkView> view =
+        viewer.view({point.position, point.normal, point.min_distance_m, point.max_distance_m});
+    if (!view) continue;
+    // What the depth says decides on the landmark's fate only, not on whether it is searched: depth and landmark are
+    // both off at times, the descriptor has the last word.
+    const SurfaceCheck surface = look_at(frame, *view);
+    if (surface == SurfaceCheck::kSeenThrough)
+      ++uses_[point.id].seen_through;
+    else if (surface != SurfaceCheck::kHidden)
+      visible.push_back(point.id);
+    const float radius = static_cast<float>(options_.local_map_radius_px) * model_->level_scale(view->level);
+    queries_.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
+                        view->level - 1, view->level + 1, point.descriptor, -1.f});
     query_source_.push_back(static_cast<int>(k));
   }
   match_projected(queries_, current_.features->orb, current_.features->grid,
@@ -241,16 +263,29 @@ int Tracker::track_local_map() {
     candidates_.features.push_back(m.feature);
     candidates_.landmarks.push_back(point.id);
   }
-  SE3 refined = pose;
+  SE3 refined = current_.camera_from_world;
   const int inliers = estimate_pose(candidates_, refined);
   if (inliers < options_.min_inliers) return inliers;
   current_.camera_from_world = refined;
   for (std::size_t i = 0; i < candidates_.points.size(); ++i) {
-    current_.landmarks[static_cast<std::size_t>(candidates_.features[i])] = candidates_.landmarks[i];
+    const auto feature = static_cast<std::size_t>(candidates_.features[i]);
+    current_.landmarks[feature] = candidates_.landmarks[i];
+    is_tracked_[feature] = 1;
     found.push_back(candidates_.landmarks[i]);
   }
   count_uses(visible, found);
   return inliers;
+}
+
+SurfaceCheck Tracker::look_at(const RgbdFrame& frame, const LandmarkView& view) const {
+  const Camera& camera = model_->camera();
+  if (const cv::Mat& excluded = filter_.excluded(); !excluded.empty()) {
+    const Eigen::Vector2d recorded = camera.distortion.is_zero() ? view.pixel : camera.distort(view.pixel);
+    const int x = std::clamp(cvRound(recorded.x()), 0, excluded.cols - 1);
+    const int y = std::clamp(cvRound(recorded.y()), 0, excluded.rows - 1);
+    if (excluded.at<std::uint8_t>(y, x) != 0) return SurfaceCheck::kHidden;
+  }
+  return check_surface(camera, frame.depth, view.pixel, view.in_camera.z());
 }
 
 void Tracker::count_uses(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found) {
@@ -264,11 +299,12 @@ void Tracker::count_uses(const std::vector<LandmarkId>& visible, const std::vect
 
 bool Tracker::wants_key_frame(int inliers, FrameId frame) const {
   const int since = static_cast<int>(frame.value - last_key_frame_.value);
-  if (since < options_.min_frames_between) return false;
+  const bool almost_lost = inliers < 0.5 * options_.key_frame_ratio * local_->reference_matches;
+  if (since < options_.min_frames_between) return almost_lost;
   // While mapping still works on the last request the snapshot cannot know what that one will bring: only a view that
   // is about to get lost is worth another.
   const bool pending = local_->reference_frame < last_key_frame_;
-  if (pending) return inliers < 0.5 * options_.key_frame_ratio * local_->reference_matches;
+  if (pending) return almost_lost;
   int tracked_close = 0, new_close = 0;
   for (std::size_t i = 0; i < current_.features->size(); ++i) {
     const float depth = current_.features->depth_m[i];
@@ -291,7 +327,7 @@ KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
     request.camera_from_reference = last_relative_->camera_from_reference;
   }
   request.uses.reserve(uses_.size());
-  for (const auto& [id, use] : uses_) request.uses.push_back({id, use.visible, use.found});
+  for (const auto& [id, use] : uses_) request.uses.push_back({id, use.visible, use.found, use.seen_through});
   std::sort(request.uses.begin(), request.uses.end(),
             [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
   uses_.clear();

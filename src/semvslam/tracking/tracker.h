@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "semvslam/data/frame.h"
+#include "semvslam/dynamic/dynamic_filter.h"
 #include "semvslam/feature/matching.h"
 #include "semvslam/feature/orb_extractor.h"
+#include "semvslam/map/depth_surface.h"
+#include "semvslam/map/landmark_view.h"
 #include "semvslam/map/local_map.h"
 #include "semvslam/solve/pose_optimizer.h"
 #include "semvslam/tracking/messages.h"
@@ -26,12 +29,18 @@ struct TrackingOptions {
   int min_new_close = 70;          // this many close features have none
   double close_depth_m = 3.5;
   int max_frames_between = 30;  // ... or so many frames have passed
-  int min_frames_between = 0;   // never sooner than this
+  /// Not sooner than this, unless about to get lost: the window of key frames that mapping adjusts spans more time, and
+  /// blurred frames in a row do not drift away on landmarks of their own.
+  int min_frames_between = 3;
 };
 
 /// Milliseconds that one step spent, by part.
 struct TrackingTimes {
-  double extract_ms = 0, motion_ms = 0, local_map_ms = 0, total_ms = 0;
+  double extract_ms = 0;    // features, their depth
+  double dynamic_ms = 0;    // restoration of masks, motion consistency
+  double frame_ms = 0;      // pose from the previous frame
+  double local_map_ms = 0;  // pose from the local map
+  double total_ms = 0;
 };
 
 /// The camera's pose for every frame, from features matched to the previous frame and to the local map. Pure state
@@ -45,13 +54,20 @@ class Tracker {
     int inliers = 0;                           // landmarks that agree with the pose
     std::optional<KeyFrameRequest> key_frame;  // present when this frame should be kept
     TrackingTimes times;
+    std::shared_ptr<const DynamicRecord> dynamic;  // what was left out, and why
   };
 
-  Tracker(const TrackingOptions& options, const OrbOptions& orb, std::shared_ptr<const ObservationModel> model);
+  Tracker(const TrackingOptions& options, const OrbOptions& orb, const DynamicOptions& dynamic,
+          std::shared_ptr<const ObservationModel> model);
 
+  /// @param segmentation of this frame or of an earlier one; null = none.
   /// @param local the newest snapshot of the map; null before the first key frame has been mapped.
   /// @param may_request whether mapping would take a key frame now.
-  Output step(const RgbdFrame& frame, std::shared_ptr<const LocalMap> local, bool may_request);
+  Output step(const RgbdFrame& frame, const Segmentation* segmentation, std::shared_ptr<const LocalMap> local,
+              bool may_request);
+
+  /// Motion consistency from now on: there will be no masks any more.
+  void use_motion() { filter_.use_motion(); }
 
  private:
   struct Tracked {  // the frame that is being or was last tracked
@@ -67,12 +83,16 @@ class Tracker {
     void clear();
   };
 
-  Output initialise(const RgbdFrame& frame);
+  /// Features of the static scene, by everything that the filter knows.
+  void observe(const RgbdFrame& frame, const Segmentation* segmentation, TrackingTimes& times);
+  void initialise(const RgbdFrame& frame, Output& output);
+  void estimate(const RgbdFrame& frame, bool may_request, Output& output);
   /// Moves the previous frame with its reference key frame when mapping has adjusted that, and follows fused landmarks.
   void adopt(std::shared_ptr<const LocalMap> local);
   bool track_motion(const SE3& predicted, double radius_factor);
   bool track_descriptors();
-  int track_local_map();
+  int track_local_map(const RgbdFrame& frame);
+  SurfaceCheck look_at(const RgbdFrame& frame, const LandmarkView& view) const;
   int estimate_pose(Candidates& candidates, SE3& camera_from_world);
   bool wants_key_frame(int inliers, FrameId frame) const;
   KeyFrameRequest make_request(const RgbdFrame& frame);
@@ -81,6 +101,7 @@ class Tracker {
   TrackingOptions options_;
   std::shared_ptr<const ObservationModel> model_;
   OrbExtractor extractor_;
+  DynamicFilter filter_;
   std::shared_ptr<const LocalMap> local_;
   Tracked current_, last_;
   SE3 velocity_;  // current_from_last
@@ -93,8 +114,9 @@ class Tracker {
   // Scratch that is kept to save allocations.
   std::vector<ProjectedQuery> queries_;
   std::vector<Match> matches_;
-  std::vector<std::uint8_t> inlier_, is_matched_;
+  std::vector<std::uint8_t> inlier_, is_tracked_;
   std::vector<int> query_source_;
+  std::vector<cv::Point2f> pixels_;
   Candidates candidates_;
 };
 

@@ -14,11 +14,11 @@ class TrackerTest : public ::testing::Test {
   TrackerTest()
       : model(std::make_shared<ObservationModel>(world.camera(), NoiseModel{}, level_scales(OrbOptions{}))),
         map(model),
-        tracker(TrackingOptions{}, OrbOptions{}, model) {}
+        tracker(TrackingOptions{}, OrbOptions{}, DynamicOptions{}, model) {}
 
   /// Maps the first frame the way mapping does: every feature with depth becomes a landmark.
   std::shared_ptr<const LocalMap> start() {
-    const Tracker::Output first = tracker.step(world.render(0), nullptr, true);
+    const Tracker::Output first = tracker.step(world.render(0), nullptr, nullptr, true);
     EXPECT_TRUE(first.key_frame.has_value());
     const KeyFrameId id = map.add_key_frame(first.key_frame->frame, {}, SE3(), first.key_frame->features);
     for (std::uint32_t i = 0; i < first.key_frame->features->size(); ++i)
@@ -36,10 +36,10 @@ class TrackerTest : public ::testing::Test {
 TEST_F(TrackerTest, TheFirstFrameWithDepthBecomesAKeyFrameAtTheOrigin) {
   RgbdFrame blind = world.render(0);
   blind.depth.setTo(0);
-  const Tracker::Output none = tracker.step(blind, nullptr, true);
+  const Tracker::Output none = tracker.step(blind, nullptr, nullptr, true);
   EXPECT_EQ(none.state, TrackingState::kInitializing);
   EXPECT_FALSE(none.key_frame.has_value());
-  const Tracker::Output first = tracker.step(world.render(0), nullptr, true);
+  const Tracker::Output first = tracker.step(world.render(0), nullptr, nullptr, true);
   EXPECT_EQ(first.state, TrackingState::kTracking);
   ASSERT_TRUE(first.key_frame.has_value());
   EXPECT_FALSE(first.key_frame->reference.valid());
@@ -48,7 +48,7 @@ TEST_F(TrackerTest, TheFirstFrameWithDepthBecomesAKeyFrameAtTheOrigin) {
 TEST_F(TrackerTest, PosesFollowTheTruth) {
   const auto local = start();
   for (int i = 1; i <= 12; ++i) {
-    const Tracker::Output out = tracker.step(world.render(i), local, false);
+    const Tracker::Output out = tracker.step(world.render(i), nullptr, local, false);
     ASSERT_EQ(out.state, TrackingState::kTracking) << "frame " << i;
     const SE3 error = out.camera_from_world * PlaneWorld::world_from_camera(i);
     EXPECT_LT(error.translation().norm(), 0.002) << "frame " << i;
@@ -59,39 +59,39 @@ TEST_F(TrackerTest, PosesFollowTheTruth) {
 
 TEST_F(TrackerTest, AFrameWithoutFeaturesIsLostAndTheNextGoodOneIsFound) {
   const auto local = start();
-  ASSERT_EQ(tracker.step(world.render(1), local, false).state, TrackingState::kTracking);
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
   RgbdFrame dark = world.render(2);
   dark.gray.setTo(0);
-  const Tracker::Output lost = tracker.step(dark, local, true);
+  const Tracker::Output lost = tracker.step(dark, nullptr, local, true);
   EXPECT_EQ(lost.state, TrackingState::kLost);
   EXPECT_FALSE(lost.relative.has_value());
   EXPECT_FALSE(lost.key_frame.has_value());
-  const Tracker::Output found = tracker.step(world.render(5), local, false);
+  const Tracker::Output found = tracker.step(world.render(5), nullptr, local, false);
   ASSERT_EQ(found.state, TrackingState::kTracking);
   EXPECT_LT((found.camera_from_world * PlaneWorld::world_from_camera(5)).translation().norm(), 0.002);
 }
 
 TEST_F(TrackerTest, DescriptorsAloneBridgeAJumpThatNoPredictionCovers) {
   const auto local = start();
-  ASSERT_EQ(tracker.step(world.render(1), local, false).state, TrackingState::kTracking);
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
   SE3::Tangent jump;
   jump << 0.25, 0.1, 0, 0, 0, 0.6;  // a third of the image and 34 degrees of roll
   const SE3 truth = SE3::exp(jump);
-  const Tracker::Output out = tracker.step(world.render(truth, 2), local, false);
+  const Tracker::Output out = tracker.step(world.render(truth, 2), nullptr, local, false);
   ASSERT_EQ(out.state, TrackingState::kTracking);
   EXPECT_LT((out.camera_from_world * truth).translation().norm(), 0.004);
 }
 
 TEST_F(TrackerTest, ThePreviousFrameFollowsItsKeyFrameWhenMappingMovesThat) {
   const auto local = start();
-  ASSERT_EQ(tracker.step(world.render(1), local, false).state, TrackingState::kTracking);
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
   // Mapping moves the whole world by 0.5 m: everything relative stays as it was.
   const SE3 moved_from_old(Eigen::Quaterniond::Identity(), {0.5, 0, 0});
   auto moved = std::make_shared<LocalMap>(*local);
   for (auto& point : moved->points) point.position = moved_from_old * point.position;
   for (auto& key_frame : moved->key_frames)
     key_frame.camera_from_world = key_frame.camera_from_world * moved_from_old.inverse();
-  const Tracker::Output out = tracker.step(world.render(2), moved, false);
+  const Tracker::Output out = tracker.step(world.render(2), nullptr, moved, false);
   ASSERT_EQ(out.state, TrackingState::kTracking);
   EXPECT_LT((out.camera_from_world * moved_from_old * PlaneWorld::world_from_camera(2)).translation().norm(), 0.002);
 }
@@ -101,7 +101,7 @@ TEST_F(TrackerTest, AKeyFrameIsAskedForWhenTheViewChangesAndOnlyWhenAllowed) {
   bool asked = false;
   for (int i = 1; i <= 30 && !asked; ++i) {
     EXPECT_FALSE(i < 2 && asked);
-    asked = tracker.step(world.render(i), local, i >= 28).key_frame.has_value();
+    asked = tracker.step(world.render(i), nullptr, local, i >= 28).key_frame.has_value();
     if (i < 28) {
       EXPECT_FALSE(asked) << "not allowed before frame 28";
     }
@@ -117,11 +117,36 @@ TEST_F(TrackerTest, NoFeatureIsTakenFromMaskedPixels) {
   TrackingOptions eager;
   eager.key_frame_ratio = 1;
   eager.max_frames_between = 1;
-  Tracker masked(eager, OrbOptions{}, model);
-  (void)masked.step(world.render(0), nullptr, true);
-  const Tracker::Output out = masked.step(frame, local, true);
+  Tracker masked(eager, OrbOptions{}, DynamicOptions{}, model);
+  (void)masked.step(world.render(0), nullptr, nullptr, true);
+  const Tracker::Output out = masked.step(frame, nullptr, local, true);
   ASSERT_TRUE(out.key_frame.has_value());
   for (const Keypoint& k : out.key_frame->features->orb.keypoints) EXPECT_GE(k.x_px, 159.f);
+  EXPECT_EQ(out.dynamic->mask_source, MaskSource::kGiven);
+}
+
+TEST_F(TrackerTest, LandmarksThatTheDepthLooksThroughAreReported) {
+  const auto local = start();
+  TrackingOptions eager;
+  eager.max_frames_between = 1;
+  eager.min_frames_between = 0;
+  Tracker looking(eager, OrbOptions{}, DynamicOptions{}, model);
+  (void)looking.step(world.render(0), nullptr, nullptr, true);
+  RgbdFrame frame = world.render(SE3(), 1);
+  frame.depth(cv::Rect(0, 0, 160, 240)) *= 2;  // the left half of the wall has moved away
+  const Tracker::Output out = looking.step(frame, nullptr, local, true);
+  ASSERT_TRUE(out.key_frame.has_value());
+  int through = 0;
+  for (const LandmarkUse& use : out.key_frame->uses) {
+    const LocalMap::Point* point = local->find(use.landmark);
+    ASSERT_NE(point, nullptr);
+    const double x_px = world.camera().project(point->position).x();
+    if (x_px > 165) {
+      EXPECT_EQ(use.seen_through, 0);
+    }
+    through += use.seen_through;
+  }
+  EXPECT_GT(through, 50);
 }
 
 }  // namespace

@@ -1,0 +1,282 @@
+#include "semvslam/dynamic/dynamic_filter.h"
+
+#include <algorithm>
+#include <chrono>
+#include <opencv2/imgproc.hpp>
+
+namespace semvslam {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+bool overlap(const cv::Rect& a, const cv::Rect& b) {
+  const int both = (a & b).area();
+  return both * 10 > 3 * (a.area() + b.area() - both);  // IoU above 0.3
+}
+
+}  // namespace
+
+struct DynamicFilter::State {
+  State(const Camera& c, const DynamicOptions& o) : camera(c), options(o), size(c.width_px, c.height_px) {
+    if (o.needs_segmentation()) repair.emplace(c, o.restoration);
+    if (o.motion) motion.emplace(c, o.motion_options);
+  }
+
+  void use_segmentation(const Segmentation* given);
+  void compose_mask();
+  void add_moving_things(double time_s);
+  void find_moving_instances(double time_s);
+  void mark_features(std::span<const cv::Point2f> pixels);
+  void open_if_needed(std::span<const float> depths_m);
+  void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
+  void dilate(cv::Mat& mask) const;
+
+  const Camera camera;
+  const DynamicOptions options;
+  const cv::Size size;
+  std::optional<SegmentationRepair> repair;
+  std::optional<MotionDetector> motion;
+
+  // Of the present frame.
+  RgbdFrame frame;
+  std::optional<SE3> cur_from_prev;
+  Segmentation segmentation;
+  std::size_t masked_instances = 0;  // the best so many of segmentation.instances mask; fewer when the filter opened
+  cv::Mat excluded;                  // what features are not extracted from
+  MotionResult motion_result;
+  cv::Mat regions_mask, instances_mask;  // moving things of no class; moving instances of movable classes
+  std::vector<std::uint8_t> usable;
+  std::shared_ptr<DynamicRecord> record;
+
+  struct MovableMemory {  // an instance of a movable class that was seen to move
+    cv::Rect window;
+    double moved_at_s = 0;
+  };
+  std::vector<MovableMemory> moved;
+  std::vector<MotionVerdict> verdicts;  // scratch
+};
+
+DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options)
+    : state_(std::make_unique<State>(camera, options)) {}
+DynamicFilter::~DynamicFilter() = default;
+
+void DynamicFilter::begin(const RgbdFrame& frame, const Segmentation* segmentation,
+                          const std::optional<SE3>& cur_from_prev) {
+  State& s = *state_;
+  s.frame = frame;
+  s.cur_from_prev = cur_from_prev;
+  s.record = std::make_shared<DynamicRecord>();
+  s.record->frame = frame.id;
+  s.segmentation = {};
+  if (s.repair) {
+    const Clock::time_point start = Clock::now();
+    s.use_segmentation(segmentation);
+    s.record->repair_ms = ms_since(start);
+  }
+  s.masked_instances = s.segmentation.instances.size();
+  s.compose_mask();
+}
+
+void DynamicFilter::State::use_segmentation(const Segmentation* given) {
+  RepairInput input;
+  input.frame = frame.id;
+  input.stamp = frame.stamp;
+  input.gray = frame.gray;
+  input.depth = frame.depth;
+  input.segmentation = given;
+  input.cur_from_prev = cur_from_prev;
+  RepairedSegmentation repaired = repair->process(input);
+  segmentation = std::move(repaired.segmentation);
+  record->repair = repaired.record;
+  record->instances = static_cast<int>(segmentation.instances.size());
+  if (given != nullptr) {
+    record->mask_source = given->frame == frame.id ? MaskSource::kSegmented : MaskSource::kPropagated;
+    record->mask_age_frames = static_cast<int>(frame.id.value - given->frame.value);
+  } else if (!segmentation.instances.empty()) {
+    record->mask_source = MaskSource::kPropagated;
+  }
+}
+
+void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool whole_box) const {
+  const cv::Rect all(cv::Point(), size);
+  if (whole_box) {
+    const cv::Rect box(cv::Point(cvFloor(instance.box.x), cvFloor(instance.box.y)),
+                       cv::Point(cvCeil(instance.box.br().x), cvCeil(instance.box.br().y)));
+    target(box & all).setTo(255);
+    return;
+  }
+  const cv::Rect window = instance.window & all;
+  if (window == instance.window && !window.empty()) target(window).setTo(255, instance.mask);
+}
+
+void DynamicFilter::State::dilate(cv::Mat& mask) const {
+  if (options.dilate_px <= 0) return;
+  const int side = 2 * options.dilate_px + 1;
+  cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+}
+
+void DynamicFilter::State::compose_mask() {
+  excluded = cv::Mat();
+  const bool boxes = options.masks == "boxes";
+  for (std::size_t i = 0; i < masked_instances; ++i) {
+    const Instance& instance = segmentation.instances[i];
+    if (instance.role != Role::kDynamic) continue;
+    if (excluded.empty()) excluded = cv::Mat::zeros(size, CV_8UC1);
+    paint(excluded, instance, boxes);
+  }
+  if (!frame.mask.empty()) {
+    if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
+    if (excluded.empty())
+      excluded = frame.mask.clone();
+    else
+      cv::bitwise_or(excluded, frame.mask, excluded);
+  }
+  if (!excluded.empty()) dilate(excluded);
+  record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
+}
+
+const cv::Mat& DynamicFilter::excluded() const { return state_->excluded; }
+
+bool DynamicFilter::relax(int features_with_depth) {
+  State& s = *state_;
+  if (features_with_depth >= s.options.least_features || s.masked_instances == 0) return false;
+  s.masked_instances /= 2;  // instances stand best first
+  s.record->fail_open = FailOpen::kSemantic;
+  s.compose_mask();
+  return true;
+}
+
+const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2f> pixels,
+                                                      std::span<const float> depths_m) {
+  State& s = *state_;
+  DynamicRecord& record = *s.record;
+  s.usable.assign(pixels.size(), 1);
+  record.features.resize(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) record.features[i].pixel = pixels[i];
+  record.moving = s.excluded;
+  if (!s.motion) return s.usable;
+
+  const Clock::time_point start = Clock::now();
+  MotionFrame frame;
+  frame.id = s.frame.id;
+  frame.time_s = s.frame.stamp.seconds();
+  frame.gray = s.frame.gray;
+  frame.depth = s.frame.depth;
+  frame.cur_from_prev = s.cur_from_prev;
+  frame.corners = pixels;
+  frame.excluded = s.excluded;
+  s.motion_result = s.motion->step(frame);
+  s.motion->judge(pixels, depths_m, s.verdicts);
+  for (const TrackMotion& track : s.motion_result.check.tracks)
+    ++record.track_reasons[static_cast<std::size_t>(track.reason)];
+  record.moving_regions = static_cast<int>(s.motion_result.regions.size());
+  s.add_moving_things(frame.time_s);
+  s.mark_features(pixels);
+  s.open_if_needed(depths_m);
+  record.motion_ms = ms_since(start);
+  return s.usable;
+}
+
+void DynamicFilter::State::add_moving_things(double time_s) {
+  regions_mask = motion_result.mask;
+  instances_mask = cv::Mat();
+  find_moving_instances(time_s);
+  if (regions_mask.empty() && instances_mask.empty()) return;
+  // The exclusion mask stays as it was extracted with; the record gets everything.
+  record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
+  for (cv::Mat* mask : {&regions_mask, &instances_mask}) {
+    if (mask->empty()) continue;
+    dilate(*mask);
+    cv::bitwise_or(record->moving, *mask, record->moving);
+  }
+}
+
+void DynamicFilter::State::find_moving_instances(double time_s) {
+  cv::Mat labels;
+  for (std::size_t i = 0; i < segmentation.instances.size(); ++i) {
+    const Instance& instance = segmentation.instances[i];
+    if (instance.role != Role::kMovable || instance.mask.empty()) continue;
+    if (labels.empty()) labels = cv::Mat::zeros(size, CV_16UC1);
+    labels(instance.window).setTo(static_cast<double>(i + 1), instance.mask);
+  }
+  std::erase_if(moved, [&](const MovableMemory& m) { return time_s - m.moved_at_s > options.movable_hold_s; });
+  if (labels.empty()) return;
+  const std::vector<InstanceMotion> motions =
+      count_instance_motion(motion->tracks(), motion_result.check.tracks, labels, segmentation.instances.size());
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const Instance& instance = segmentation.instances[i];
+    if (instance.role != Role::kMovable) continue;
+    const auto memory = std::find_if(moved.begin(), moved.end(),
+                                     [&](const MovableMemory& m) { return overlap(m.window, instance.window); });
+    const bool moves =
+        motions[i].moving >= options.movable_points && motions[i].moving_share() >= options.movable_share;
+    if (!moves && memory == moved.end()) continue;
+    if (memory == moved.end())
+      moved.push_back({instance.window, time_s});
+    else
+      *memory = {instance.window, moves ? time_s : memory->moved_at_s};
+    if (instances_mask.empty()) instances_mask = cv::Mat::zeros(size, CV_8UC1);
+    paint(instances_mask, instance, false);
+    ++record->moving_instances;
+  }
+}
+
+void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
+  const auto inside = [&](const cv::Mat& mask, const cv::Point2f& p) {
+    return !mask.empty() && mask.at<std::uint8_t>(std::clamp(cvRound(p.y), 0, size.height - 1),
+                                                  std::clamp(cvRound(p.x), 0, size.width - 1)) != 0;
+  };
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    FeatureMark& mark = record->features[i];
+    if (inside(instances_mask, mark.pixel))
+      mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingInstance;
+    else if (inside(regions_mask, mark.pixel))
+      mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingRegion;
+    else if (verdicts[i] == MotionVerdict::kMoving)
+      mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kPointMotion;
+    else if (verdicts[i] == MotionVerdict::kStatic)
+      mark.verdict = FeatureVerdict::kStatic, mark.reason = FeatureReason::kNone;
+    usable[i] = mark.verdict != FeatureVerdict::kMoving;
+  }
+}
+
+void DynamicFilter::State::open_if_needed(std::span<const float> depths_m) {
+  int left = 0, dropped = 0;
+  for (std::size_t i = 0; i < depths_m.size(); ++i) {
+    if (depths_m[i] <= 0) continue;
+    (usable[i] != 0 ? left : dropped) += 1;
+  }
+  if (left >= options.least_features || dropped == 0) return;
+  // Geometry is the first to be doubted: with so little left that agrees, it may have taken the room for the mover.
+  std::fill(usable.begin(), usable.end(), std::uint8_t{1});
+  record->moving = excluded;
+  record->fail_open = FailOpen::kMotion;
+}
+
+void DynamicFilter::end(const std::optional<SE3>& camera_from_world, std::span<const std::uint8_t> tracked) {
+  State& s = *state_;
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < s.record->features.size(); ++i) {
+    FeatureMark& mark = s.record->features[i];
+    if (s.usable[i] != 0 && left < tracked.size()) mark.tracked = tracked[left++] != 0;
+    ++s.record->verdicts[static_cast<std::size_t>(mark.verdict)];
+    ++s.record->reasons[static_cast<std::size_t>(mark.reason)];
+  }
+  if (s.motion && camera_from_world) s.motion->set_pose(s.frame.id, *camera_from_world);
+}
+
+void DynamicFilter::use_motion() {
+  if (!state_->motion) state_->motion.emplace(state_->camera, state_->options.motion_options);
+}
+
+void DynamicFilter::forget_poses() {
+  if (state_->motion) state_->motion->forget_poses();
+}
+
+std::shared_ptr<const DynamicRecord> DynamicFilter::record() const { return state_->record; }
+
+}  // namespace semvslam

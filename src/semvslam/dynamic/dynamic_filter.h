@@ -1,0 +1,72 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "semvslam/base/config_schema.h"
+#include "semvslam/data/frame.h"
+#include "semvslam/dynamic/dynamic_record.h"
+#include "semvslam/motion/motion_detector.h"
+#include "semvslam/semantic/segmentation_repair.h"
+
+namespace semvslam {
+
+struct DynamicOptions {
+  std::string masks = "off";    // off; boxes: whole boxes of instances of dynamic classes; masks: their pixels
+  bool motion = false;          // motion consistency
+  int dilate_px = 4;            // masks grow by this: the descriptor of a corner on the outline sees both sides
+  int least_features = 120;     // with depth; with fewer the filter opens
+  double movable_share = 0.4;   // of the points of an instance of a movable class that move: it is moving
+  int movable_points = 4;       // that must move at least
+  double movable_hold_s = 1.0;  // it counts as moving for that long after it stopped
+  RepairOptions restoration;    // of missed segmentations
+  MotionOptions motion_options;
+
+  void add_to(ConfigSchema& schema);
+  /// Errors of the parts' options that single values cannot show.
+  Status check() const;
+  bool needs_segmentation() const { return masks != "off"; }
+};
+
+/// The one policy on what may move: puts segmentation, its restoration and motion consistency together and says of
+/// every feature whether it may be used, and of every pixel whether it belongs to the static scene (paper,
+/// sections 2.2, 2.4, 2.5). Per frame, in this order: begin, judge, end. One thread.
+class DynamicFilter {
+ public:
+  /// @param options must pass check().
+  DynamicFilter(const Camera& camera, const DynamicOptions& options);
+  ~DynamicFilter();
+
+  /// @param segmentation of this frame, or a late one (its `frame` says of which); null = none.
+  /// @param cur_from_prev expected motion of the camera since the last frame.
+  void begin(const RgbdFrame& frame, const Segmentation* segmentation, const std::optional<SE3>& cur_from_prev);
+  /// CV_8UC1, non-zero where no features shall be extracted; empty = everywhere.
+  const cv::Mat& excluded() const;
+  /// Opens the masks further when too few features were found outside them: the instances with the least scores go
+  /// first. @return whether excluded() has changed.
+  bool relax(int features_with_depth);
+
+  /// Verdicts on the features found outside excluded(). @param pixels recorded. @param depths_m as many, 0 = unknown.
+  /// @return per feature whether it may be used.
+  const std::vector<std::uint8_t>& judge(std::span<const cv::Point2f> pixels, std::span<const float> depths_m);
+
+  /// @param camera_from_world what tracking found; empty = lost. @param tracked per feature that judge() left: a
+  /// landmark was found at it.
+  void end(const std::optional<SE3>& camera_from_world, std::span<const std::uint8_t> tracked);
+  /// Motion consistency from the next frame on, whatever the options said.
+  void use_motion();
+  /// Poses from before and after cannot be compared (the map was corrected, the camera was re-localised).
+  void forget_poses();
+
+  /// Of the frame between begin and the next begin.
+  std::shared_ptr<const DynamicRecord> record() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace semvslam

@@ -1,0 +1,223 @@
+#include "semvslam/dynamic/dynamic_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+namespace semvslam {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 240;
+
+Camera small_camera() {
+  Camera camera;
+  camera.width_px = kWidth;
+  camera.height_px = kHeight;
+  camera.fx_px = camera.fy_px = 260;
+  camera.cx_px = 159.5;
+  camera.cy_px = 119.5;
+  return camera;
+}
+
+/// A textured wall 3 m away and a textured board before it, 1.5 m away, that may be shifted.
+RgbdFrame make_frame(std::uint32_t id, int board_x_px) {
+  RgbdFrame frame;
+  frame.id = FrameId(id);
+  frame.stamp = TimeStamp{id * 33'333'333LL};
+  cv::RNG random(7);
+  frame.gray.create(kHeight, kWidth, CV_8UC1);
+  random.fill(frame.gray, cv::RNG::UNIFORM, 0, 256);
+  cv::Mat board(100, 80, CV_8UC1);
+  random.fill(board, cv::RNG::UNIFORM, 0, 256);
+  frame.depth = cv::Mat(kHeight, kWidth, CV_32FC1, cv::Scalar(3.0));
+  const cv::Rect place(board_x_px, 70, 80, 100);
+  board.copyTo(frame.gray(place));
+  cv::GaussianBlur(frame.gray, frame.gray, {}, 1.5);
+  frame.depth(place).setTo(1.5);
+  return frame;
+}
+
+Instance make_instance(Role role, const cv::Rect& window, float score) {
+  Instance instance;
+  instance.class_name = role == Role::kDynamic ? "person" : "chair";
+  instance.role = role;
+  instance.score = score;
+  instance.window = window;
+  instance.box = window;
+  instance.mask = cv::Mat(window.size(), CV_8UC1, cv::Scalar(255));
+  return instance;
+}
+
+Segmentation make_segmentation(FrameId frame, std::vector<Instance> instances) {
+  Segmentation segmentation;
+  segmentation.frame = frame;
+  segmentation.size = {kWidth, kHeight};
+  segmentation.instances = std::move(instances);
+  return segmentation;
+}
+
+/// Points on a raster, as features would be.
+std::vector<cv::Point2f> raster() {
+  std::vector<cv::Point2f> points;
+  for (int y = 16; y < kHeight - 16; y += 9)
+    for (int x = 16; x < kWidth - 16; x += 9) points.emplace_back(static_cast<float>(x), static_cast<float>(y));
+  return points;
+}
+
+std::vector<float> depths_at(const std::vector<cv::Point2f>& points, const cv::Mat& depth) {
+  std::vector<float> depths;
+  for (const cv::Point2f& p : points) depths.push_back(depth.at<float>(cvRound(p.y), cvRound(p.x)));
+  return depths;
+}
+
+DynamicOptions with(const std::string& masks, bool motion) {
+  DynamicOptions options;
+  options.masks = masks;
+  options.motion = motion;
+  options.restoration.mode = "off";
+  return options;
+}
+
+TEST(DynamicFilter, WithoutEvidenceNothingIsLeftOut) {
+  DynamicFilter filter(small_camera(), with("off", false));
+  const RgbdFrame frame = make_frame(0, 100);
+  const Segmentation person = make_segmentation(frame.id, {make_instance(Role::kDynamic, {10, 10, 50, 50}, 0.9f)});
+  filter.begin(frame, &person, std::nullopt);
+  EXPECT_TRUE(filter.excluded().empty());
+  const std::vector<cv::Point2f> points = raster();
+  const auto& usable = filter.judge(points, depths_at(points, frame.depth));
+  EXPECT_EQ(std::count(usable.begin(), usable.end(), 1), static_cast<std::ptrdiff_t>(points.size()));
+  filter.end(SE3(), {});
+  EXPECT_EQ(filter.record()->count(FeatureVerdict::kUnknown), static_cast<int>(points.size()));
+  EXPECT_EQ(filter.record()->mask_source, MaskSource::kNone);
+}
+
+TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedAndGrown) {
+  DynamicOptions options = with("masks", false);
+  options.dilate_px = 3;
+  DynamicFilter filter(small_camera(), options);
+  const RgbdFrame frame = make_frame(0, 100);
+  Instance person = make_instance(Role::kDynamic, {40, 40, 50, 60}, 0.9f);
+  person.mask.rowRange(30, 60).setTo(0);  // the box is twice as high as what was segmented
+  const Segmentation segmentation =
+      make_segmentation(frame.id, {person, make_instance(Role::kMovable, {200, 40, 50, 60}, 0.9f)});
+  filter.begin(frame, &segmentation, std::nullopt);
+  cv::Mat expected = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
+  expected(cv::Rect(37, 37, 56, 36)).setTo(255);
+  EXPECT_EQ(cv::norm(filter.excluded(), expected, cv::NORM_INF), 0);
+  EXPECT_EQ(filter.record()->mask_source, MaskSource::kSegmented);
+
+  options.masks = "boxes";
+  DynamicFilter boxes(small_camera(), options);
+  boxes.begin(frame, &segmentation, std::nullopt);
+  expected(cv::Rect(37, 37, 56, 66)).setTo(255);
+  EXPECT_EQ(cv::norm(boxes.excluded(), expected, cv::NORM_INF), 0);
+}
+
+TEST(DynamicFilter, AGivenMaskCountsInEveryMode) {
+  DynamicFilter filter(small_camera(), with("off", false));
+  RgbdFrame frame = make_frame(0, 100);
+  frame.mask = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
+  frame.mask(cv::Rect(100, 100, 20, 20)).setTo(7);
+  filter.begin(frame, nullptr, std::nullopt);
+  EXPECT_NE(filter.excluded().at<std::uint8_t>(110, 110), 0);
+  EXPECT_EQ(filter.excluded().at<std::uint8_t>(50, 50), 0);
+  EXPECT_EQ(filter.record()->mask_source, MaskSource::kGiven);
+}
+
+TEST(DynamicFilter, AFrameFullOfPersonsOpensTheWeakestMasksFirst) {
+  DynamicFilter filter(small_camera(), with("masks", false));
+  const RgbdFrame frame = make_frame(0, 100);
+  const Segmentation crowd =
+      make_segmentation(frame.id, {make_instance(Role::kDynamic, {0, 0, kWidth / 2, kHeight}, 0.95f),
+                                   make_instance(Role::kDynamic, {kWidth / 2, 0, kWidth / 2, kHeight}, 0.6f)});
+  filter.begin(frame, &crowd, std::nullopt);
+  EXPECT_EQ(cv::countNonZero(filter.excluded()), kWidth * kHeight);
+  ASSERT_TRUE(filter.relax(0));
+  EXPECT_NE(filter.excluded().at<std::uint8_t>(120, 20), 0) << "the better one still masks";
+  EXPECT_EQ(filter.excluded().at<std::uint8_t>(120, 300), 0);
+  EXPECT_EQ(filter.record()->fail_open, FailOpen::kSemantic);
+  EXPECT_FALSE(filter.relax(1000)) << "enough features: nothing more is opened";
+  EXPECT_TRUE(filter.relax(0));
+  EXPECT_FALSE(filter.relax(0)) << "nothing is left to open";
+  EXPECT_TRUE(filter.excluded().empty() || cv::countNonZero(filter.excluded()) == 0);
+}
+
+TEST(DynamicFilter, AMaskOfAnotherSizeIsLeftOutAndTheRecordSaysSo) {
+  DynamicFilter filter(small_camera(), with("masks", false));
+  const RgbdFrame frame = make_frame(0, 100);
+  Segmentation segmentation = make_segmentation(frame.id, {make_instance(Role::kDynamic, {600, 400, 20, 20}, 0.9f)});
+  segmentation.size = {640, 480};
+  filter.begin(frame, &segmentation, std::nullopt);
+  EXPECT_TRUE(filter.excluded().empty() || cv::countNonZero(filter.excluded()) == 0);
+  EXPECT_FALSE(filter.record()->repair.note.empty());
+}
+
+/// Runs a board that moves by `step_px` a frame past a still camera.
+std::shared_ptr<const DynamicRecord> move_board(DynamicFilter& filter, int step_px, bool with_chair) {
+  const std::vector<cv::Point2f> points = raster();
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    const int x = 60 + static_cast<int>(i) * step_px;
+    const RgbdFrame frame = make_frame(i, x);
+    Segmentation chair = make_segmentation(frame.id, {});
+    if (with_chair) chair.instances.push_back(make_instance(Role::kMovable, {x, 70, 80, 100}, 0.8f));
+    filter.begin(frame, &chair, i > 0 ? std::optional<SE3>(SE3()) : std::nullopt);
+    (void)filter.judge(points, depths_at(points, frame.depth));
+    filter.end(SE3(), {});
+  }
+  return filter.record();
+}
+
+TEST(DynamicFilter, AMovingThingOfNoClassIsFoundByMotionAlone) {
+  DynamicFilter filter(small_camera(), with("off", true));
+  const auto record = move_board(filter, 4, false);
+  int moving_on_board = 0, on_board = 0, moving_on_wall = 0, on_wall = 0;
+  const cv::Rect board(60 + 11 * 4, 70, 80, 100);
+  const cv::Rect near_board(board.x - 14, board.y - 14, board.width + 28, board.height + 28);
+  for (const FeatureMark& mark : record->features) {
+    const bool moving = mark.verdict == FeatureVerdict::kMoving;
+    if (board.contains(mark.pixel)) {
+      ++on_board;
+      moving_on_board += moving;
+    } else if (!near_board.contains(mark.pixel)) {
+      ++on_wall;
+      moving_on_wall += moving;
+    }
+  }
+  EXPECT_GT(moving_on_board, on_board * 9 / 10);
+  EXPECT_LE(moving_on_wall, on_wall / 100);
+  EXPECT_GE(record->moving_regions, 1);
+}
+
+TEST(DynamicFilter, AMovableInstanceIsLeftOutOnlyWhenItMoves) {
+  DynamicFilter moving(small_camera(), with("masks", true));
+  EXPECT_EQ(move_board(moving, 4, true)->moving_instances, 1);
+  DynamicFilter still(small_camera(), with("masks", true));
+  const auto record = move_board(still, 0, true);
+  EXPECT_EQ(record->moving_instances, 0);
+  EXPECT_EQ(record->count(FeatureVerdict::kMoving), 0);
+}
+
+TEST(DynamicFilter, WithTooFewFeaturesLeftMotionIsDoubtedFirst) {
+  DynamicOptions options = with("off", true);
+  options.least_features = 100000;
+  DynamicFilter filter(small_camera(), options);
+  const auto record = move_board(filter, 4, false);
+  EXPECT_EQ(record->fail_open, FailOpen::kMotion);
+  EXPECT_GT(record->count(FeatureVerdict::kMoving), 0) << "the verdicts are recorded all the same";
+}
+
+TEST(DynamicFilter, FramesWithoutDepthOrFeaturesAreFine) {
+  DynamicFilter filter(small_camera(), with("masks", true));
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    RgbdFrame frame = make_frame(i, 100);
+    frame.depth = cv::Mat();
+    filter.begin(frame, nullptr, std::nullopt);
+    EXPECT_TRUE(filter.judge({}, {}).empty());
+    filter.end(std::nullopt, {});
+    EXPECT_EQ(filter.record()->fail_open, FailOpen::kNo);
+  }
+}
+
+}  // namespace
+}  // namespace semvslam

@@ -1,0 +1,22 @@
+#include "semvslam/dynamic/dynamic_filter.h"
+
+namespace semvslam {
+
+void DynamicOptions::add_to(ConfigSchema& s) {
+  s.add("dynamic.masks", &masks, {"off", "boxes", "masks"},
+        "what of instances of dynamic classes is left out: nothing, their boxes, their pixels");
+  s.add("dynamic.motion", &motion, "motion consistency: find what moves without knowing its class");
+  s.add("dynamic.dilate_px", &dilate_px, {0, 50}, "masks grow by this, px");
+  s.add("dynamic.least_features", &least_features, {0, 20000},
+        "features with depth below which the filter opens: motion first, then the weakest masks");
+  s.add("dynamic.movable_share", &movable_share, {0, 1},
+        "share of the points of a movable instance (chair, book, cup) that move: it is moving");
+  s.add("dynamic.movable_points", &movable_points, {1, 1000}, "and so many must");
+  s.add("dynamic.movable_hold_s", &movable_hold_s, {0, 60}, "it counts as moving for that long after it stopped, s");
+  restoration.add_to(s);
+  motion_options.add_to(s);
+}
+
+Status DynamicOptions::check() const { return restoration.check(); }
+
+}  // namespace semvslam

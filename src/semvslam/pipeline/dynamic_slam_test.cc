@@ -1,0 +1,123 @@
+// The facade with masks: where they come from, what happens when they do not come.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "semvslam/pipeline/slam.h"
+#include "semvslam/tracking/plane_world_testing.h"
+
+namespace semvslam {
+namespace {
+
+using testing::PlaneWorld;
+
+class NoticeCollector final : public Sink {
+ public:
+  void on_frame(const RgbdFrame&, const TrackResult& result) override { last = result.dynamic; }
+  void on_notice(const std::string& line) override { lines.push_back(line); }
+  std::vector<std::string> lines;
+  std::shared_ptr<const DynamicRecord> last;
+};
+
+class DynamicSlamTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder = std::filesystem::path(::testing::TempDir()) /
+             ("masks_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directories(folder);
+    for (int i = 0; i < kFrames; ++i) {
+      cv::Mat mask = cv::Mat::zeros(240, 320, CV_8UC1);
+      mask(cv::Rect(60 + i, 60, 60, 120)).setTo(1);
+      cv::imwrite(file(i).string(), mask);
+    }
+    config.deterministic = true;
+    EXPECT_TRUE(config.apply_mode("masks"));
+    config.segment.source = "folder";
+    config.segment.mask_folder = folder.string();
+  }
+  void TearDown() override { std::filesystem::remove_all(folder); }
+
+  std::filesystem::path file(int frame) const {
+    char name[32];
+    std::snprintf(name, sizeof name, "%.6f.png", world.render(frame).stamp.seconds());
+    return folder / name;
+  }
+  /// Tracks all frames; every one must be tracked.
+  void run() {
+    Result<std::unique_ptr<Slam>> made = Slam::create(config, world.camera());
+    ASSERT_TRUE(made) << made.error().message;
+    slam = std::move(*made);
+    slam->add_sink(notices);
+    for (int i = 0; i < kFrames; ++i) {
+      const Result<TrackResult> result = slam->process(world.render(i));
+      ASSERT_TRUE(result) << result.error().message;
+      EXPECT_EQ(result->state, TrackingState::kTracking) << "frame " << i;
+      sources.push_back(result->mask_source);
+    }
+    ASSERT_TRUE(slam->finish());
+  }
+
+  static constexpr int kFrames = 12;
+  PlaneWorld world;
+  std::filesystem::path folder;
+  Config config;
+  std::unique_ptr<Slam> slam;
+  std::shared_ptr<NoticeCollector> notices = std::make_shared<NoticeCollector>();
+  std::vector<MaskSource> sources;
+};
+
+TEST_F(DynamicSlamTest, EveryFrameIsTrackedWithItsOwnMask) {
+  run();
+  EXPECT_EQ(std::count(sources.begin(), sources.end(), MaskSource::kSegmented), kFrames);
+  const cv::Rect person(60 + kFrames - 1, 60, 60, 120);
+  ASSERT_NE(notices->last, nullptr);
+  ASSERT_GT(notices->last->features.size(), 100u);
+  for (const FeatureMark& mark : notices->last->features) EXPECT_FALSE(person.contains(mark.pixel));
+  EXPECT_EQ(slam->statistics().dynamic.mask_sources[static_cast<std::size_t>(MaskSource::kSegmented)],
+            static_cast<std::uint64_t>(kFrames));
+  EXPECT_TRUE(notices->lines.empty());
+}
+
+TEST_F(DynamicSlamTest, ASegmenterThatFailsInMidRunIsReplacedByMotionAndSaidOnce) {
+  std::ofstream(file(5), std::ios::trunc) << "no PNG";
+  run();
+  ASSERT_EQ(notices->lines.size(), 1u);
+  EXPECT_NE(notices->lines[0].find("motion"), std::string::npos) << notices->lines[0];
+  EXPECT_EQ(slam->statistics().notices, notices->lines);
+  EXPECT_EQ(sources[4], MaskSource::kSegmented);
+  EXPECT_EQ(sources[8], MaskSource::kNone);
+  const DynamicTotals totals = slam->statistics().dynamic;
+  EXPECT_GT(totals.track_reasons[static_cast<std::size_t>(MotionReason::kNone)], 0u) << "motion found points at rest";
+}
+
+TEST_F(DynamicSlamTest, AMissingNetworkIsReplacedByMotionFromTheStart) {
+  config.segment.source = "network";
+  config.segment.model = (folder / "nowhere").string();
+  run();
+  ASSERT_EQ(notices->lines.size(), 1u);
+  EXPECT_NE(notices->lines[0].find("nowhere"), std::string::npos) << notices->lines[0];
+  EXPECT_TRUE(slam->effective_config().dynamic.motion);
+}
+
+TEST_F(DynamicSlamTest, MasksOfAnotherSizeAreAFailureOfTheSegmenter) {
+  for (int i = 0; i < kFrames; ++i) cv::imwrite(file(i).string(), cv::Mat::zeros(48, 64, CV_8UC1));
+  run();
+  EXPECT_EQ(notices->lines.size(), 1u);
+}
+
+TEST_F(DynamicSlamTest, RealtimeNeverWaitsAndStillUsesMasks) {
+  config.deterministic = false;
+  config.realtime = true;
+  EXPECT_TRUE(config.apply_mode("full"));
+  config.segment.source = "folder";
+  config.segment.mask_folder = folder.string();
+  run();
+  EXPECT_TRUE(notices->lines.empty());
+}
+
+}  // namespace
+}  // namespace semvslam
