@@ -11,7 +11,7 @@ constexpr int kGrid = 4;                  // px: overlaps are counted on every 4
 constexpr double kMerged = 0.5;           // share of a carried mask that others cover when it is no object of its own
 constexpr double kLeastMeasured = 0.5;    // share of a lost part that must have depth: without, nothing speaks for it
 constexpr double kLeastAgreement = 0.85;  // share of the segmented rest that the carried mask must cover
-constexpr double kHalfHidden = 0.6;       // share of an object that is seen when it counts as half hidden
+constexpr double kHalfHidden = 0.5;       // share of the lost pixels behind something nearer that explains a loss
 constexpr double kLeastPiece = 0.7;   // share of the smaller of two masks that the other covers if it is a piece of it
 constexpr float kDepthReachM = 0.4f;  // change of an object's median depth from frame to frame
 constexpr int kGapPx = 5;             // two outlines of one object differ by up to this
@@ -180,7 +180,7 @@ MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional
   for (const Instance& i : segmentation.instances)
     step.depths_m.push_back(median_depth_m(i.window, i.mask, present.half_depth_m(), 8));
   for (Track& t : tracks_) {
-    ++t.whole_age;
+    ++t.known_age;
     t.present_from_whole = t.present_from_whole && cur_from_prev
                                ? std::optional<SE3>(*cur_from_prev * *t.present_from_whole)
                                : std::nullopt;
@@ -199,6 +199,7 @@ MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional
     fresh.id = now.track;
     fresh.confirmed = 1;
     fresh.depth_m = step.depths_m[i];
+    fresh.known = now;
     renew(step, fresh, now, cv::countNonZero(now.mask));
     kept.push_back(std::move(fresh));
   }
@@ -218,8 +219,8 @@ void InstanceMemory::match(Step& step) {
       const Instance& now = step.segmentation.instances[i];
       if (now.role != Role::kDynamic || now.class_name != track.whole.class_name) continue;
       const Overlap o = overlap(track.last.window, track.last.mask, cv::Point(track.velocity_px), now.window, now.mask);
-      const cv::Point2f shift = track.shift_px + track.velocity_px;
-      const Overlap w = overlap(track.whole.window, track.whole.mask, cv::Point(shift), now.window, now.mask);
+      const cv::Point2f shift = track.known_shift_px + track.velocity_px;
+      const Overlap w = overlap(track.known.window, track.known.mask, cv::Point(shift), now.window, now.mask);
       const bool known = track.depth_m > 0 && step.depths_m[i] > 0;
       const bool same_depth = known && std::abs(track.depth_m - step.depths_m[i]) < kDepthReachM;
       // Half hidden, an object is a piece of what it was.
@@ -241,19 +242,27 @@ void InstanceMemory::follow(Step& step, Track& track, std::size_t index) {
   const int segmented_px = cv::countNonZero(now.mask);
   const bool shrunk = segmented_px < (1 - options_.limb_trigger) * track.whole_px;
   const cv::Point2f moved = centre(now) - centre(track.last);
-  const bool extended = (shrunk || step.lacking) && track.confirmed >= options_.confirmations &&
-                        track.extended < options_.longest_carry && extend(step, track, now);
+  track.half_hidden = false;
+  const bool look = (shrunk || step.lacking) && track.confirmed >= options_.confirmations;
+  const bool extended = look && track.extended < options_.longest_carry && extend(step, track, now);
   track.extended = extended ? track.extended + 1 : 0;
   track.carried = 0;
   track.hidden = false;
   if (step.depths_m[index] > 0) track.depth_m = step.depths_m[index];
   ++track.confirmed;
   now.track = track.id;
-  // Half hidden, it stays known as a whole for a while, to be found again on the other side.
-  const bool half_hidden = segmented_px < kHalfHidden * track.whole_px && track.whole_age <= options_.longest_carry;
-  if (!extended && !half_hidden) {
+  if (!extended) {
+    const bool by_flow = track.half_hidden && track.velocity_known;
+    if (!by_flow) track.velocity_px = moved;
     renew(step, track, now, segmented_px);
-    track.velocity_px = moved;
+  }
+  // Half hidden, it stays known as a whole for a while, to be found again on the other side.
+  if (track.half_hidden && track.known_age <= options_.longest_carry) {
+    track.known_shift_px += track.velocity_px;
+  } else {
+    track.known = now;
+    track.known_shift_px = {};
+    track.known_age = 0;
   }
   track.last = now;
 }
@@ -263,7 +272,6 @@ void InstanceMemory::renew(const Step& step, Track& track, const Instance& now, 
   track.whole = now;
   track.whole_images = step.present;
   track.whole_px = pixels;
-  track.whole_age = 0;
   track.present_from_whole = SE3();
   track.shift_px = {};
 }
@@ -271,13 +279,16 @@ void InstanceMemory::renew(const Step& step, Track& track, const Instance& now, 
 CarriedMask InstanceMemory::carry_whole(const Step& step, Track& track) const {
   CarriedMask out = carry_.carry(track.whole_images, step.present, track.whole.window, track.whole.mask,
                                  track.present_from_whole, track.shift_px + track.velocity_px);
-  if (out.flow_points > 0) track.velocity_px = out.shift_px - track.shift_px;
+  track.velocity_known = out.flow_points > 0;
+  if (track.velocity_known) track.velocity_px = out.shift_px - track.shift_px;
   track.shift_px = out.shift_px;
   return out;
 }
 
 bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
   const CarriedMask carried = carry_whole(step, track);
+  const double lost = 1 - static_cast<double>(cv::countNonZero(now.mask)) / std::max(1, track.whole_px);
+  track.half_hidden = carried.outcome == CarryOutcome::kOccluded || carried.occluded > kHalfHidden * lost;
   if (carried.outcome != CarryOutcome::kVisible) return false;
   // What is still segmented shows whether the mask came to the right place.
   const Overlap agreement = overlap(carried.window, carried.mask, {}, now.window, now.mask);
@@ -311,6 +322,7 @@ bool InstanceMemory::restore(Step& step, Track& track) {
   if (track.confirmed < options_.confirmations || track.carried >= options_.longest_carry) return false;
   CarriedMask carried = carry_whole(step, track);
   track.hidden = carried.outcome == CarryOutcome::kOccluded;
+  track.known_shift_px += track.velocity_px;
   if (track.hidden) ++track.carried;
   if (carried.outcome != CarryOutcome::kVisible) return track.hidden;
   const int carried_px = cv::countNonZero(carried.mask);

@@ -52,9 +52,14 @@ class InstanceMemory {
     int whole_age = 0;                      // frames
     float depth_m = 0;                      // median; 0 = unknown
     std::optional<SE3> present_from_whole;  // camera motion since then; none = unknown
+    bool velocity_known = false;            // the last one was measured by flow
     cv::Point2f shift_px, velocity_px;      // motion since then, motion per frame
     int confirmed = 0;                      // frames in which it was segmented
     int carried = 0;                        // frames in a row without
+    Instance known;                         // as last seen unhidden: what it is recognised by
+    cv::Point2f known_shift_px;             // motion since then
+    int known_age = 0;                      // frames
+    bool half_hidden = false;               // segmented, but partly behind something nearer
     bool hidden = false;                    // behind something nearer; may come out again
     int extended = 0;                       // frames in a row with a part put back
   };

@@ -266,6 +266,7 @@ CarriedMask MaskCarry::carry(const CarryFrame& from, const CarryFrame& to, const
   Warped warped = warp(object, motion, before, now, check);
   const int judged = warped.kept + warped.nearer + warped.farther;
   out.support = judged > 0 ? static_cast<float>(warped.kept) / static_cast<float>(judged) : 1.f;
+  out.occluded = judged > 0 ? static_cast<float>(warped.nearer) / static_cast<float>(judged) : 0.f;
   if (warped.kept + warped.unmeasured == 0 || out.support < options_.least_support) {
     out.outcome = warped.nearer > warped.farther ? CarryOutcome::kOccluded : CarryOutcome::kGone;
     return out;

@@ -64,6 +64,7 @@ struct CarriedMask {
   cv::Point2f shift_px;      // median motion of the mask
   float depth_change_m = 0;  // median change of depth along the motion
   float support = 0;         // share of the carried pixels that the present depth agrees with; 1 without depth
+  float occluded = 0;        // share of the carried pixels that lie behind something nearer
   float inside = 0;          // share of the carried pixels that lie in the image
   int flow_points = 0;       // LK points that the motion rests on; 0 = pose or nothing
 };

@@ -172,7 +172,8 @@ TEST(SegmentationRepair, CrossingPersonsKeepTheirIds) {
   Feeder f(in_mode("carry"));
   std::map<int, TrackId> first;  // by depth order: 0 = farther
   for (int i = 0; i < 12; ++i) {
-    const TestView view = f.scene.view(i, {moved(kWalker, 30 + 5 * i), moved(kOther, -60 - 5 * i)});
+    const Cutout child{"person", {160 - 5 * i, 110}, {45, 90}, 1.5, 2, false};  // hides half of the other
+    const TestView view = f.scene.view(i, {moved(kWalker, 30 + 5 * i), child});
     const RepairedSegmentation r = f.feed(view);
     for (int n = 0; n < 2; ++n) {
       const TrackId track = r.segmentation.instances.at(static_cast<std::size_t>(n)).track;
