@@ -11,6 +11,7 @@ std::span<const Command> commands() {
       Command{"eval", "measure a trajectory against the ground truth: ATE, RPE, improvement, plot", setup_eval},
       Command{"segment", "find people and things in pictures: overlay, instance image, JSON", setup_segment},
       Command{"eval-seg", "score the segmentation against labelled pictures", setup_eval_seg},
+      Command{"eval-repair", "damage masks and measure what their repair is worth", setup_eval_repair},
       Command{"render", "write a rendered recording with exact ground truth and masks", setup_render},
       Command{"config", "show every configuration value with its meaning", setup_config},
       Command{"version", "print the version", setup_version},
