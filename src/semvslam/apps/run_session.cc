@@ -9,6 +9,7 @@
 #include "semvslam/apps/interrupt.h"
 #include "semvslam/apps/progress.h"
 #include "semvslam/apps/run_output.h"
+#include "semvslam/apps/truth_masks.h"
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/base/process_stats.h"
 #include "semvslam/base/stage_timer.h"
@@ -266,6 +267,13 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
                    fmt::format("{}: cannot make the folder ({})", options.debug_frames.string(), code.message())};
     (*slam)->add_sink(std::make_shared<DebugFrameSink>(options.debug_frames, *output));
   }
+  std::shared_ptr<TruthMaskSink> truth;
+  if (!options.truth_masks.empty()) {
+    Result<std::shared_ptr<TruthMaskSink>> opened = TruthMaskSink::open(options.truth_masks, config.orb);
+    if (!opened) return opened.error();
+    truth = std::move(*opened);
+    (*slam)->add_sink(truth);
+  }
   if (const Status status = output->write("config.yaml", config.schema().dump_yaml()); !status) return status.error();
   RunRecord record;
   record.sequence = source->description();
@@ -283,6 +291,7 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
     outcome.signal = InterruptGuard::received();
     keep_first(outcome.status, (*slam)->finish());
     outcome.record = session.record(end_text(outcome.status, outcome.signal));
+    if (truth) outcome.record.truth = truth->counts();
   }
   outcome.statistics = (*slam)->statistics();
   outcome.trajectory = (*slam)->trajectory();

@@ -49,29 +49,33 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
   stages["input"] = stage_to_json(run.input);
   for (const StageSummary& stage : slam.stages) stages[stage.name] = stage_to_json(stage);
   const double share = run.read == 0 ? 0 : static_cast<double>(slam.tracked) / static_cast<double>(run.read);
-  const Json json = {{"version", SEMVSLAM_VERSION},
-                     {"sequence", run.sequence},
-                     {"mode", run.mode},
-                     {"deterministic", run.deterministic},
-                     {"realtime", run.realtime},
-                     {"end", run.end},
-                     {"frames", run.read},
-                     {"skipped", run.skipped},
-                     {"dropped", run.dropped},
-                     {"tracked", slam.tracked},
-                     {"lost", slam.lost},
-                     {"tracked_share", share},
-                     {"key_frames", slam.key_frames},
-                     {"landmarks", slam.landmarks},
-                     {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
-                     {"notices", slam.notices},
-                     {"stages_ms", stages},
-                     {"start_up_s", run.start_up_s},
-                     {"wall_s", run.wall_s},
-                     {"cpu_s", run.cpu_s},
-                     {"cpu_ms_per_frame", per_frame(run.cpu_s, run.read)},
-                     {"frames_per_s", run.wall_s > 0 ? static_cast<double>(run.read) / run.wall_s : 0.0},
-                     {"peak_memory_mb", static_cast<double>(run.peak_memory_bytes) / 1e6}};
+  Json json = {{"version", SEMVSLAM_VERSION},
+               {"sequence", run.sequence},
+               {"mode", run.mode},
+               {"deterministic", run.deterministic},
+               {"realtime", run.realtime},
+               {"end", run.end},
+               {"frames", run.read},
+               {"skipped", run.skipped},
+               {"dropped", run.dropped},
+               {"tracked", slam.tracked},
+               {"lost", slam.lost},
+               {"tracked_share", share},
+               {"key_frames", slam.key_frames},
+               {"landmarks", slam.landmarks},
+               {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
+               {"notices", slam.notices},
+               {"stages_ms", stages},
+               {"start_up_s", run.start_up_s},
+               {"wall_s", run.wall_s},
+               {"cpu_s", run.cpu_s},
+               {"cpu_ms_per_frame", per_frame(run.cpu_s, run.read)},
+               {"frames_per_s", run.wall_s > 0 ? static_cast<double>(run.read) / run.wall_s : 0.0},
+               {"peak_memory_mb", static_cast<double>(run.peak_memory_bytes) / 1e6}};
+  if (run.truth)
+    json["truth"] = {{"frames", run.truth->frames},
+                     {"kept_on_moving", run.truth->kept_on_moving_share()},
+                     {"static_dropped", run.truth->static_dropped_share()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "semvslam/apps/truth_masks.h"
 #include "semvslam/pipeline/slam.h"
 
 namespace semvslam {
@@ -19,8 +21,9 @@ struct RunRecord {
   double wall_s = 0;          // of the frames
   double cpu_s = 0;           // of the whole process
   std::int64_t peak_memory_bytes = 0;
-  StageSummary input;  // waiting for frames
-  std::string end;     // "complete", "running", or why it ended early
+  StageSummary input;                // waiting for frames
+  std::optional<TruthCounts> truth;  // where true masks were given
+  std::string end;                   // "complete", "running", or why it ended early
 };
 
 /// Content of stats.json.
