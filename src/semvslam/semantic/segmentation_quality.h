@@ -21,9 +21,9 @@ std::string_view to_string(SegmentationState state);
 /// two results. How they were chosen: docs/restoration.md.
 struct MissingSegmentationOptions {
   int history = 5;  // N: largest k
-  double alpha = 3.0, alpha_step = 0.5;
-  double beta = 4.0, beta_step = 1.0;
-  double gamma = 8.0, gamma_step = 2.0;
+  double alpha = 2.5, alpha_step = 1.5;
+  double beta = 4.5, beta_step = 3.2;
+  double gamma = 9.0, gamma_step = 6.4;
   double first_reference = 500;  // ref_0, px
   double least_update = 0.05;    // share of ref below which a change says nothing about the speed of the scene
   int queue = 20;                // L_max
