@@ -46,7 +46,7 @@ struct SegmenterOptions {
   std::string backend = "auto";    // auto, openvino, opencv
   std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere
   std::string mask_folder;         // of source `folder`
-  double score = 0.5;              // least score of an instance
+  double score = 0.6;              // least score of an instance
   int threads = 2;                 // of the network
 
   void add_to(ConfigSchema& schema);
