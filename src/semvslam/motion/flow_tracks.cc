@@ -317,16 +317,11 @@ void FlowTracks::refill(const MotionFrame& frame) {
     for (const cv::Point2f& p : frame.corners) offer(p);
     return;
   }
-  // Looking for corners costs more than following them: a third of the cells in turn is enough, but for the start.
-  constexpr int kTurns = 3;
-  const bool everywhere = 2 * missing > options_.tracks;
   std::vector<cv::KeyPoint> corners;
   cv::Mat strength;
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
-      const int cell_index = row * columns + column;
-      if (count[static_cast<std::size_t>(cell_index)] >= per_cell) continue;
-      if (!everywhere && (static_cast<std::uint32_t>(cell_index) + frame.id.value) % kTurns != 0) continue;
+      if (count[static_cast<std::size_t>(row * columns + column)] >= per_cell) continue;
       // FAST looks three pixels around a corner.
       const cv::Rect window =
           cv::Rect(column * cell - 3, row * cell - 3, cell + 6, cell + 6) & cv::Rect({0, 0}, frame.gray.size());

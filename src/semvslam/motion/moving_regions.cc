@@ -12,7 +12,7 @@ namespace {
 constexpr double kSeedsPerTrack = 4;    // so many depth seeds are as good as a moving track
 constexpr int kSeedsAlone = 24;         // so many make a region without any moving track
 constexpr int kLeastSeeds = 2;          // fewer: the depth says nothing of a moving thing, and the tracks need ...
-constexpr int kTracksAlone = 3;         // ... to be so many times as many
+constexpr int kTracksAlone = 5;         // ... to be so many times as many
 constexpr int kLeastHoldingLength = 4;  // frames a track must have been at rest to hold a region back
 constexpr int kLeastMovingFrames = 3;   // in a row that a point must have moved to found a region
 constexpr double kMergeShare = 0.5;     // of the smaller region's mask inside the larger: they are one
