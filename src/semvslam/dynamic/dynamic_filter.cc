@@ -128,6 +128,8 @@ void DynamicFilter::State::compose_mask() {
     if (excluded.empty()) excluded = cv::Mat::zeros(size, CV_8UC1);
     paint(excluded, instance, boxes);
   }
+  if (!excluded.empty() && !boxes)
+    fit_to_depth(excluded, frame.depth, static_cast<float>(1.0 / camera.depth_units_per_m), options.fit);
   if (!frame.mask.empty()) {
     if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
     if (excluded.empty())

@@ -9,6 +9,7 @@
 #include "semvslam/base/config_schema.h"
 #include "semvslam/data/frame.h"
 #include "semvslam/dynamic/dynamic_record.h"
+#include "semvslam/dynamic/mask_fit.h"
 #include "semvslam/motion/motion_detector.h"
 #include "semvslam/semantic/segmentation_repair.h"
 
@@ -17,6 +18,7 @@ namespace semvslam {
 struct DynamicOptions {
   std::string masks = "off";    // off; boxes: whole boxes of instances of dynamic classes; masks: their pixels
   bool motion = false;          // motion consistency
+  MaskFitOptions fit;           // of the masks' outlines to the depth image
   int dilate_px = 4;            // masks grow by this: the descriptor of a corner on the outline sees both sides
   int least_features = 120;     // with depth; with fewer the filter opens
   double movable_share = 0.4;   // of the points of an instance of a movable class that move: it is moving

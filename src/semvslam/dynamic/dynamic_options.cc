@@ -6,6 +6,11 @@ void DynamicOptions::add_to(ConfigSchema& s) {
   s.add("dynamic.masks", &masks, {"off", "boxes", "masks"},
         "what of instances of dynamic classes is left out: nothing, their boxes, their pixels");
   s.add("dynamic.motion", &motion, "motion consistency: find what moves without knowing its class");
+  s.add("dynamic.fit_band_px", &fit.band_px, {0, 100},
+        "the outline of a mask may move by this to fit the depth image, px; 0 = it stays");
+  s.add("dynamic.fit_tolerance_m", &fit.tolerance_m, {0.01, 10},
+        "depth that is that near to a thing's belongs to it, m");
+  s.add("dynamic.fit_reach_px", &fit.reach_px, {4, 1000}, "window over which the depth of a thing is averaged, px");
   s.add("dynamic.dilate_px", &dilate_px, {0, 50}, "masks grow by this, px");
   s.add("dynamic.least_features", &least_features, {0, 20000},
         "features with depth below which the filter opens: motion first, then the weakest masks");
