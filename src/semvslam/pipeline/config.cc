@@ -23,7 +23,7 @@ void describe(ConfigSchema& s, NoiseModel& n) {
   s.add("noise.disparity_weight", &n.disparity_weight, {1e-6, 1},
         "share of the depth's information that is used; its errors are correlated over the image");
   s.add("noise.depth_edge_ratio", &n.depth_edge_ratio, {0.001, 10},
-        "depth is not used where it spreads more than this share in 3x3 pixels");
+        "depth is not used where it spreads more than this share around a corner");
   s.add("noise.min_depth_m", &n.min_depth_m, {0, 100}, "nearer depth is not used, m");
   s.add("noise.max_depth_m", &n.max_depth_m, {0.1, 1000}, "farther depth is not used, m");
 }

@@ -170,7 +170,6 @@ TEST(Slam, SinksReceiveEveryFrameInOrder) {
 
 TEST(Config, EveryValueSurvivesBeingWrittenAndReadBack) {
   Config config;
-  config.schema();
   ConfigSchema schema = config.schema();
   ASSERT_TRUE(schema.set("tracking.key_frame_ratio=0.5").ok());
   ASSERT_TRUE(schema.set("mapping.local_map.nearby_key_frames=3").ok());
