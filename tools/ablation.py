@@ -20,7 +20,7 @@ MODES = "orb,boxes,masks,masks+repair,masks+motion,motion,full"
 
 def run_once(program, sequence, mode, out, extra):
     command = [program, "run", sequence, "--mode", mode, "--out", out, "--quiet", *extra]
-    if (sequence / "mask").is_dir():
+    if any((sequence / "mask").glob("*.png")):
         command += ["--truth-masks", "mask"]
     done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     if done.returncode != 0:
