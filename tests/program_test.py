@@ -155,15 +155,27 @@ class ProgramTest(unittest.TestCase):
         self.out.write_text("a file")
         self.expect_error(call("run", self.sequence, "--out", self.out), 4, self.out.name)
 
+    def there_and_back(self, times):
+        """The sequence forth, back, forth...: as long as one likes, with no more pictures."""
+        copy = self.copy_of_sequence()
+        for name in ("rgb.txt", "depth.txt"):
+            lines = [line.split() for line in (copy / name).read_text().splitlines() if not line.startswith("#")]
+            files = [file for _, file in lines]
+            walk = [file for i in range(times) for file in (files if i % 2 == 0 else files[::-1])]
+            first = float(lines[0][0])
+            (copy / name).write_text("".join(f"{first + i / 30:.6f} {file}\n" for i, file in enumerate(walk)))
+        return copy
+
     def test_full_disk(self):
-        size = len(call("config").stdout) + 500  # enough to start, but not for the poses of 90 frames
-        self.assertLess(size, 90 * 80)
+        size = len(call("config").stdout) + 500  # enough to start, but not for the poses of 270 frames
+        self.assertLess(size, 270 * 70)
+        sequence = self.there_and_back(3)
 
         def limit():  # files may not grow beyond this, as on a full disk
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
-        done = call("run", self.sequence, "--out", self.out, preexec_fn=limit, restore_signals=False)
+        done = call("run", sequence, "--out", self.out, "--mode", "orb", preexec_fn=limit, restore_signals=False)
         self.expect_error(done, 4)
         lines = (self.out / "trajectory.txt").read_text().splitlines()
         self.assertLess(20, len(lines))
