@@ -29,7 +29,7 @@ bool DepthSeeds::was_empty(const Past& past, const Eigen::Vector3d& point) const
   const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
   for (const int dy : {0, -kEdgeMarginPx, kEdgeMarginPx})
     for (const int dx : {0, -kEdgeMarginPx, kEdgeMarginPx}) {
-      const double z = motion_depth_m(past.depth, unit, x + dx, y + dy);
+      const double z = depth_at_m(past.depth, unit, x + dx, y + dy);
       if (!(z > 0)) return false;  // nothing measured: the thing may have been there
       const double noise = options_.depth_sigma_per_m2 * std::hypot(z * z, p.z() * p.z());
       const double sigma = std::hypot(noise, options_.depth_bias_share * z);
@@ -50,7 +50,7 @@ const std::vector<DepthSeed>& DepthSeeds::step(const cv::Mat& depth, const std::
     const Past& past = past_.front();
     const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
     for (const Place& place : raster_) {
-      const float z = motion_depth_m(depth, unit, place.pixel.x, place.pixel.y);
+      const float z = depth_at_m(depth, unit, place.pixel.x, place.pixel.y);
       if (z > 0 && was_empty(past, place.ray * z)) seeds_.push_back({place.pixel, z});
     }
   }

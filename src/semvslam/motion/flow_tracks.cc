@@ -75,8 +75,8 @@ float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, in
   if (x < reach_px || y < reach_px || x >= depth.cols - reach_px || y >= depth.rows - reach_px) return 0;
   float bend = 0;
   for (const auto& [dx, dy] : {std::pair{reach_px, 0}, {0, reach_px}, {reach_px, reach_px}, {reach_px, -reach_px}}) {
-    const float a = motion_depth_m(depth, metres_per_unit, x + dx, y + dy);
-    const float b = motion_depth_m(depth, metres_per_unit, x - dx, y - dy);
+    const float a = depth_at_m(depth, metres_per_unit, x + dx, y + dy);
+    const float b = depth_at_m(depth, metres_per_unit, x - dx, y - dy);
     if (a > 0 && b > 0)
       bend = std::max(bend, std::abs(a + b - 2 * centre_m));
     else if (a > 0 || b > 0)
@@ -110,7 +110,7 @@ float median_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) 
   std::size_t count = 0;
   for (int v = std::max(0, y - 1); v <= std::min(depth.rows - 1, y + 1); ++v)
     for (int u = std::max(0, x - 1); u <= std::min(depth.cols - 1, x + 1); ++u)
-      if (const float d = motion_depth_m(depth, metres_per_unit, u, v); d > 0) values[count++] = d;
+      if (const float d = depth_at_m(depth, metres_per_unit, u, v); d > 0) values[count++] = d;
   if (count < 3) return 0;
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count / 2),
                    values.begin() + static_cast<std::ptrdiff_t>(count));
@@ -310,7 +310,7 @@ void FlowTracks::refill(const MotionFrame& frame) {
       return;
     if (count[cell_of(p)] >= per_cell || inside_mask(frame.excluded, {p.x, p.y}) || !occupied.take(p.x, p.y)) return;
     ++count[cell_of(p)];
-    tracks_.emplace_back(TrackId(next_id_++));
+    tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
   };
   if (!frame.corners.empty()) {

@@ -13,7 +13,7 @@
 
 namespace semvslam {
 
-using TrackId = Id<struct TrackTag>;  // never used twice in one FlowTracks
+using PointTrackId = Id<struct PointTrackTag>;  // never used twice in one FlowTracks
 
 /// Where one point of the scene was seen in one frame.
 struct TrackSample {
@@ -32,8 +32,8 @@ class FlowTrack {
  public:
   static constexpr int kCapacity = 12;  // samples kept
 
-  explicit FlowTrack(TrackId id) : id_(id) {}
-  TrackId id() const { return id_; }
+  explicit FlowTrack(PointTrackId id) : id_(id) {}
+  PointTrackId id() const { return id_; }
   /// Samples held, 1..kCapacity.
   int size() const { return size_; }
   /// @param age 0 = newest, size() - 1 = oldest. Samples of consecutive frames.
@@ -46,7 +46,7 @@ class FlowTrack {
   void push(const TrackSample& sample);
 
  private:
-  TrackId id_;
+  PointTrackId id_;
   int head_ = -1, size_ = 0, length_ = 0;
   std::array<TrackSample, kCapacity> samples_;
 };
@@ -63,7 +63,7 @@ inline constexpr std::size_t kTrackLosses = 5;
 std::string_view to_string(TrackLoss loss);
 
 struct LostTrack {
-  TrackId id;
+  PointTrackId id;
   TrackLoss reason = TrackLoss::kNotFound;
 };
 

@@ -121,7 +121,7 @@ TEST(FlowTracks, StartsAtGivenCornersOutsideTheExcludedMask) {
 }
 
 TEST(FlowTracks, HistoryIsARing) {
-  FlowTrack track(TrackId(7));
+  FlowTrack track(PointTrackId(7));
   for (int k = 0; k < 30; ++k) {
     TrackSample sample;
     sample.frame = FrameId(static_cast<std::uint32_t>(k));

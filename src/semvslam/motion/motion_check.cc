@@ -194,7 +194,7 @@ MotionCheckResult MotionCheck::step(const MotionFrame& frame, std::span<const Fl
 }
 
 void MotionCheck::remember(std::span<const TrackMotion> motions) {
-  std::unordered_map<TrackId, Memory> moved;
+  std::unordered_map<PointTrackId, Memory> moved;
   for (const TrackMotion& motion : motions)
     if (motion.verdict == MotionVerdict::kMoving) {
       const auto before = moved_.find(motion.id);

@@ -33,7 +33,7 @@ std::string_view to_string(MotionReason reason);
 
 /// The verdict on one track with what was measured. Index as in the tracks given.
 struct TrackMotion {
-  TrackId id;
+  PointTrackId id;
   MotionVerdict verdict = MotionVerdict::kUnknown;
   MotionReason reason = MotionReason::kNew;
   int baseline_frames = 0;        // age of the sample that position and depth were predicted from
@@ -123,7 +123,7 @@ class MotionCheck {
   CameraMotionOptions camera_options_;
   FundamentalOptions fundamental_options_;
   std::vector<Pose> poses_;  // oldest first
-  std::unordered_map<TrackId, Memory> moved_;
+  std::unordered_map<PointTrackId, Memory> moved_;
 };
 
 }  // namespace semvslam

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "semvslam/base/ids.h"
+#include "semvslam/geometry/depth_image.h"
 #include "semvslam/geometry/se3.h"
 
 namespace semvslam {
@@ -24,12 +25,5 @@ struct MotionFrame {
   cv::Mat excluded;   // CV_8UC1, non-zero = certainly moving class: no evidence about the camera; empty = none
   cv::Mat instances;  // CV_16UC1, 0 = none, n = instance n - 1 of a segmentation of this frame; empty = none
 };
-
-/// Depth in metres at an integer pixel, 0 where nothing was measured; (x, y) must lie inside.
-inline float motion_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) {
-  if (depth.type() == CV_16UC1) return static_cast<float>(depth.at<std::uint16_t>(y, x)) * metres_per_unit;
-  const float d = depth.at<float>(y, x);
-  return d > 0.f && d < 1e6f ? d : 0.f;  // NaN fails both
-}
 
 }  // namespace semvslam

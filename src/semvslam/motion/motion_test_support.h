@@ -71,7 +71,7 @@ struct TrackWorld {
   /// A point that is not seen ends its track for good.
   void see(int index, const SE3& camera_from_world) {
     if (tracks.empty())
-      for (std::size_t i = 0; i < points.size(); ++i) tracks.emplace_back(TrackId(static_cast<std::uint32_t>(i)));
+      for (std::size_t i = 0; i < points.size(); ++i) tracks.emplace_back(PointTrackId(static_cast<std::uint32_t>(i)));
     groups.resize(tracks.size());
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const WorldPoint& point = points[tracks[i].id().value];

@@ -97,7 +97,7 @@ std::vector<MovingRegions::Evidence> MovingRegions::collect(const MotionFrame& f
   for (const DepthSeed& seed :
        depth_seeds_.step(frame.depth, trusted ? std::optional(camera.cur_from_prev) : std::nullopt)) {
     const cv::Point2f pixel(seed.pixel);
-    if (is_unclaimed(frame, pixel)) evidence.push_back({pixel, seed.depth_m, TrackId(), Eigen::Vector3f::Zero()});
+    if (is_unclaimed(frame, pixel)) evidence.push_back({pixel, seed.depth_m, PointTrackId(), Eigen::Vector3f::Zero()});
   }
   return evidence;
 }
@@ -267,7 +267,7 @@ void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const
 
   std::vector<GrowthSeed> from, against;
   kept.anchors = kept.fresh;
-  std::unordered_map<TrackId, double> alive;
+  std::unordered_map<PointTrackId, double> alive;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const TrackSample& sample = tracks[i].newest();
     const cv::Point2f pixel(sample.pixel.x(), sample.pixel.y());

@@ -64,17 +64,17 @@ class MovingRegions {
   struct Evidence {  // a moving track or a depth seed
     cv::Point2f pixel;
     float depth_m = 0;
-    TrackId track;  // invalid: a depth seed
+    PointTrackId track;  // invalid: a depth seed
     Eigen::Vector3f velocity_m_s = Eigen::Vector3f::Zero();
     int moving_frames = 0;
     float depth_spread_m = 0;
   };
   struct Kept {
     MovingRegion region;
-    std::unordered_map<TrackId, double> members;  // when each was last seen to move, s
-    std::vector<Evidence> fresh;                  // of this frame
-    std::vector<Evidence> anchors;                // fresh ones and members that rest
-    cv::Mat cells;                                // CV_8UC1 on the raster of CellGrid
+    std::unordered_map<PointTrackId, double> members;  // when each was last seen to move, s
+    std::vector<Evidence> fresh;                       // of this frame
+    std::vector<Evidence> anchors;                     // fresh ones and members that rest
+    cv::Mat cells;                                     // CV_8UC1 on the raster of CellGrid
   };
   std::vector<Evidence> collect(const MotionFrame& frame, std::span<const FlowTrack> tracks,
                                 const MotionCheckResult& motion);

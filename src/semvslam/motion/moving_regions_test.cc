@@ -71,7 +71,7 @@ class BoxScene {
 
  private:
   void add(const cv::Point2f& at, bool on_box) {
-    tracks.emplace_back(TrackId(static_cast<std::uint32_t>(tracks.size())));
+    tracks.emplace_back(PointTrackId(static_cast<std::uint32_t>(tracks.size())));
     start_.push_back(at);
     on_box_.push_back(on_box);
     moving_frames_.push_back(0);
@@ -226,7 +226,7 @@ TEST(InstanceMotion, CountsVerdictsPerInstance) {
   const auto add = [&](float x, MotionVerdict verdict) {
     TrackSample sample;
     sample.pixel = {x, 100};
-    tracks.emplace_back(TrackId(static_cast<std::uint32_t>(tracks.size())));
+    tracks.emplace_back(PointTrackId(static_cast<std::uint32_t>(tracks.size())));
     tracks.back().push(sample);
     motion.push_back({});
     motion.back().verdict = verdict;

@@ -63,7 +63,7 @@ CellGrid::CellGrid(const Camera& camera, const cv::Mat& depth)
   for (int r = 0; r < rows; ++r)
     for (int c = 0; c < columns; ++c) {
       const int x = std::min(c * kCellPx + 1, depth.cols - 1), y = std::min(r * kCellPx + 1, depth.rows - 1);
-      depth_m[static_cast<std::size_t>(r * columns + c)] = motion_depth_m(depth, unit, x, y);
+      depth_m[static_cast<std::size_t>(r * columns + c)] = depth_at_m(depth, unit, x, y);
     }
 }
 
