@@ -46,7 +46,7 @@ def times_ms(program, names, seconds, environment):
 
 def run_statistics(program, sequence):
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([program, "run", sequence, "--out", out, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([program, "run", sequence, "--out", out, "--mode", "orb", "--quiet"], check=True, stdout=subprocess.DEVNULL)
         return json.loads((pathlib.Path(out) / "stats.json").read_text())
 
 

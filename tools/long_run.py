@@ -62,7 +62,7 @@ def resident_mb(pid):
 def follow(program, sequence, out):
     """Runs the program. @return its samples: (frames, tracking ms in all, processor s, memory MB, key frames, landmarks)."""
     shutil.rmtree(out, ignore_errors=True)
-    process = subprocess.Popen([program, "run", sequence, "--out", out, "--quiet"])
+    process = subprocess.Popen([program, "run", sequence, "--out", out, "--mode", "orb", "--quiet"])
     samples, last = [], -1
     while process.poll() is None:
         time.sleep(0.2)  # the program renews its statistics about once a second
