@@ -2,6 +2,7 @@
 """Trains the network. The learning rate follows the clock, so that it always ends annealed on time. See README.md."""
 import argparse
 import copy
+import itertools
 import json
 import math
 import os
@@ -11,10 +12,11 @@ from datetime import datetime, timezone
 import torch
 import torch.distributed as dist
 
-from segnet import backbones, dataset, losses, model
+from segnet import backbones, dataset, exported, losses, model
 
 
 EMA_EVERY = 4
+STATISTICS_BATCHES = 24    # for batch normalisation, when the start weights come from exported graphs
 
 
 def arguments():
@@ -26,7 +28,7 @@ def arguments():
     a.add_argument("--out", required=True, help="folder for check points and the log; an old check point there is continued")
     a.add_argument("--backbone", default="mobilenet_v2")
     a.add_argument("--start", help="start weights of the backbone (.npz by torchvision's layer names)")
-    a.add_argument("--init", help="check point to start a second stage from (weights only)")
+    a.add_argument("--init", help="check point, or folder of exported graphs such as ../models, to start from (weights only)")
     a.add_argument("--until", help="UTC time of the day HH:MM to end at")
     a.add_argument("--minutes", type=float, default=60, help="how long, without --until")
     a.add_argument("--lr", type=float, default=7e-4)
@@ -70,8 +72,11 @@ def main():
     net = model.MaskRcnn(o.backbone, len(data.names))
     if o.start:
         net.backbone.load_folded(o.start)
-    if o.init:
-        net.load_state_dict(torch.load(o.init, weights_only=False)["ema"])
+    if o.init and not state:
+        if os.path.isdir(o.init):
+            exported.load(net, o.init, data.names, itertools.islice(data, STATISTICS_BATCHES))
+        else:
+            net.load_state_dict(torch.load(o.init, weights_only=False)["ema"])
     net.backbone.freeze(o.freeze)
     net = net.to(memory_format=torch.channels_last)
     back = [p for p in net.backbone.parameters() if p.requires_grad]

@@ -122,7 +122,7 @@ class Batches(torch.utils.data.IterableDataset):
         rng = np.random.default_rng([*self.seed, info.id if info else 0])
         while True:
             late = (time.time() - self.begin) / max(1.0, self.end - self.begin) > 0.6
-            p = (0.3, 0.5, 0.2) if late else (0.6, 0.4, 0.0)        # small pictures first: more of them an hour
+            p = (0.1, 0.4, 0.5) if late else (0.4, 0.4, 0.2)        # small pictures first: more of them an hour
             H, W, n = self.canvases[rng.choice(3, p=p)]
             batch = [self.sample(rng, (H, W)) for _ in range(n)]
             yield torch.from_numpy(np.stack([b[0] for b in batch])).permute(0, 3, 1, 2), [b[1] for b in batch]

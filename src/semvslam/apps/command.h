@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "semvslam/base/result.h"
@@ -23,6 +24,9 @@ enum ExitCode : int {
 };
 
 int exit_code_of(ErrorCode code);
+
+/// Writes a result to standard output for "-", otherwise to a file, in one step.
+Status write_report(const std::string& target, const std::string& content);
 
 /// Runs a sub-command after its options were parsed. @return the exit code, or the Error that main() prints.
 using CommandHandler = std::function<Result<int>()>;

@@ -1,6 +1,9 @@
+#include <fmt/core.h>
+
 #include <array>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/data/file_io.h"
 
 namespace semvslam {
 
@@ -17,6 +20,12 @@ std::span<const Command> commands() {
       Command{"version", "print the version", setup_version},
   };
   return kCommands;
+}
+
+Status write_report(const std::string& target, const std::string& content) {
+  if (target != "-") return write_file_atomically(target, content);
+  fmt::print("{}", content);
+  return Status::success();
 }
 
 int exit_code_of(ErrorCode code) {

@@ -42,13 +42,6 @@ Result<std::vector<TimeStamp>> read_stamps(const std::string& file) {
   return stamps;
 }
 
-/// Standard output for "-", otherwise a file.
-Status write_report(const std::string& target, const std::string& content) {
-  if (target != "-") return write_file_atomically(target, content);
-  fmt::print("{}", content);
-  return Status::success();
-}
-
 Result<int> run_eval(const EvalArguments& arguments) {
   EvaluationReport report;
   report.reference_name = arguments.reference;

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "semvslam/apps/command.h"
-#include "semvslam/data/file_io.h"
 #include "semvslam/data/sequence.h"
 #include "semvslam/semantic/folder_segmenter.h"
 #include "semvslam/semantic/repair_experiment.h"
@@ -182,10 +181,8 @@ Result<int> run_eval_repair(EvalRepairArguments a) {
     print_changes(changes, history);
   }
   if (a.json.empty()) return static_cast<int>(kExitSuccess);
-  const std::string text = as_json(experiment.cases(), scores, changes, history).dump(1) + "\n";
-  if (a.json == "-")
-    fmt::print("{}", text);
-  else if (const Status status = write_file_atomically(a.json, text); !status)
+  if (const Status status = write_report(a.json, as_json(experiment.cases(), scores, changes, history).dump(1) + "\n");
+      !status)
     return status.error();
   return static_cast<int>(kExitSuccess);
 }

@@ -8,7 +8,6 @@
 
 #include "semvslam/apps/command.h"
 #include "semvslam/apps/segmenter_options.h"
-#include "semvslam/data/file_io.h"
 #include "semvslam/semantic/segmentation_files.h"
 #include "semvslam/semantic/segmentation_score.h"
 
@@ -79,10 +78,7 @@ Result<int> run_eval_seg(EvalSegArguments a) {
       fmt::print("GFLOPs per image with 50 proposals and 5 masks (two operations a multiply-add): {:.2f}\n", g);
   }
   if (a.json.empty()) return static_cast<int>(kExitSuccess);
-  const std::string text = as_json(s, time, **segmenter).dump(1) + "\n";
-  if (a.json == "-")
-    fmt::print("{}", text);
-  else if (const Status status = write_file_atomically(a.json, text); !status)
+  if (const Status status = write_report(a.json, as_json(s, time, **segmenter).dump(1) + "\n"); !status)
     return status.error();
   return static_cast<int>(kExitSuccess);
 }

@@ -1,14 +1,10 @@
 #include "semvslam/apps/truth_masks.h"
 
+#include "semvslam/geometry/mask_lookup.h"
 #include "semvslam/semantic/folder_segmenter.h"
 
 namespace semvslam {
 namespace {
-
-bool inside(const cv::Mat& mask, cv::Point2f p) {
-  return mask.at<std::uint8_t>(std::clamp(cvRound(p.y), 0, mask.rows - 1),
-                               std::clamp(cvRound(p.x), 0, mask.cols - 1)) != 0;
-}
 
 class FolderTruth final : public TruthMaskSink {
  public:
@@ -26,19 +22,19 @@ class FolderTruth final : public TruthMaskSink {
     for (const FeatureMark& mark : result.dynamic->features) {
       if (mark.verdict == FeatureVerdict::kMoving && result.dynamic->fail_open != FailOpen::kMotion) continue;
       ++counts_.kept;
-      counts_.kept_on_moving += inside(moving, mark.pixel);
+      counts_.kept_on_moving += is_masked(moving, mark.pixel);
     }
     extractor_.extract(frame.gray, cv::Mat(), whole_);
     const cv::Mat& dropped = result.dynamic->moving;
     for (const Keypoint& k : whole_.keypoints) {
       const cv::Point2f pixel(k.x_px, k.y_px);
-      if (inside(moving, pixel)) continue;
+      if (is_masked(moving, pixel)) continue;
       ++counts_.on_static;
-      counts_.static_dropped += !dropped.empty() && inside(dropped, pixel);
+      counts_.static_dropped += is_masked(dropped, pixel);
     }
     // Single points outside every mask and region are dropped too.
     for (const FeatureMark& mark : result.dynamic->features)
-      counts_.static_dropped += mark.reason == FeatureReason::kPointMotion && !inside(moving, mark.pixel);
+      counts_.static_dropped += mark.reason == FeatureReason::kPointMotion && !is_masked(moving, mark.pixel);
   }
   const TruthCounts& counts() const override { return counts_; }
 

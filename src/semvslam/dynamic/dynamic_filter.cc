@@ -1,17 +1,12 @@
 #include "semvslam/dynamic/dynamic_filter.h"
 
 #include <algorithm>
-#include <chrono>
 #include <opencv2/imgproc.hpp>
+
+#include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 bool overlap(const cv::Rect& a, const cv::Rect& b) {
   const int both = (a & b).area();
@@ -72,11 +67,7 @@ void DynamicFilter::begin(const RgbdFrame& frame, const Segmentation* segmentati
   s.record = std::make_shared<DynamicRecord>();
   s.record->frame = frame.id;
   s.segmentation = {};
-  if (s.repair) {
-    const Clock::time_point start = Clock::now();
-    s.use_segmentation(segmentation);
-    s.record->repair_ms = ms_since(start);
-  }
+  if (s.repair) s.use_segmentation(segmentation);
   s.masked_instances = s.segmentation.instances.size();
   s.compose_mask();
 }
@@ -92,7 +83,6 @@ void DynamicFilter::State::use_segmentation(const Segmentation* given) {
   RepairedSegmentation repaired = repair->process(input);
   segmentation = std::move(repaired.segmentation);
   record->repair = repaired.record;
-  record->instances = static_cast<int>(segmentation.instances.size());
   if (given != nullptr) {
     record->mask_source = given->frame == frame.id ? MaskSource::kSegmented : MaskSource::kPropagated;
     record->mask_age_frames = static_cast<int>(frame.id.value - given->frame.value);
@@ -162,7 +152,6 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.moving = s.excluded;
   if (!s.motion) return s.usable;
 
-  const Clock::time_point start = Clock::now();
   MotionFrame frame;
   frame.id = s.frame.id;
   frame.time_s = s.frame.stamp.seconds();
@@ -179,7 +168,6 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   s.add_moving_things(frame.time_s);
   s.mark_features(pixels);
   s.open_if_needed(depths_m);
-  record.motion_ms = ms_since(start);
   return s.usable;
 }
 
@@ -228,15 +216,11 @@ void DynamicFilter::State::find_moving_instances(double time_s) {
 }
 
 void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
-  const auto inside = [&](const cv::Mat& mask, const cv::Point2f& p) {
-    return !mask.empty() && mask.at<std::uint8_t>(std::clamp(cvRound(p.y), 0, size.height - 1),
-                                                  std::clamp(cvRound(p.x), 0, size.width - 1)) != 0;
-  };
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     FeatureMark& mark = record->features[i];
-    if (inside(instances_mask, mark.pixel))
+    if (is_masked(instances_mask, mark.pixel))
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingInstance;
-    else if (inside(regions_mask, mark.pixel))
+    else if (is_masked(regions_mask, mark.pixel))
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingRegion;
     else if (verdicts[i] == MotionVerdict::kMoving)
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kPointMotion;
@@ -273,10 +257,6 @@ void DynamicFilter::end(const std::optional<SE3>& camera_from_world, std::span<c
 
 void DynamicFilter::use_motion() {
   if (!state_->motion) state_->motion.emplace(state_->camera, state_->options.motion_options);
-}
-
-void DynamicFilter::forget_poses() {
-  if (state_->motion) state_->motion->forget_poses();
 }
 
 std::shared_ptr<const DynamicRecord> DynamicFilter::record() const { return state_->record; }

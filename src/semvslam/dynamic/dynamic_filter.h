@@ -60,8 +60,6 @@ class DynamicFilter {
   void end(const std::optional<SE3>& camera_from_world, std::span<const std::uint8_t> tracked);
   /// Motion consistency from the next frame on, whatever the options said.
   void use_motion();
-  /// Poses from before and after cannot be compared (the map was corrected, the camera was re-localised).
-  void forget_poses();
 
   /// Of the frame between begin and the next begin.
   std::shared_ptr<const DynamicRecord> record() const;

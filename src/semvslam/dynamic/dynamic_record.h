@@ -64,12 +64,11 @@ struct DynamicRecord {
   std::array<int, 3> verdicts{};                    // features by FeatureVerdict
   std::array<int, kFeatureReasons> reasons{};       // features by FeatureReason
   std::array<int, kMotionReasons> track_reasons{};  // point tracks of motion detection by MotionReason
-  int instances = 0, moving_instances = 0;          // segmented; of movable classes and moving
+  int moving_instances = 0;                         // of movable classes
   int moving_regions = 0;                           // moving things of no known class
   double masked_share = 0;                          // of the image's pixels, before features are extracted
   cv::Mat moving;                                   // CV_8UC1, 255 = pixel of something that moves or may; empty = none
   std::vector<FeatureMark> features;
-  double repair_ms = 0, motion_ms = 0;
 
   int count(FeatureVerdict v) const { return verdicts[static_cast<std::size_t>(v)]; }
 };

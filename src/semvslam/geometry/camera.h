@@ -28,6 +28,10 @@ struct Camera {
   Eigen::Vector2d project(const Eigen::Vector3d& p) const {
     return {fx_px * p.x() / p.z() + cx_px, fy_px * p.y() / p.z() + cy_px};
   }
+  /// Whether an ideal pixel lies in the image.
+  bool sees(const Eigen::Vector2d& pixel) const {
+    return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width_px && pixel.y() < height_px;
+  }
   /// Ideal pixel and depth along z -> point in the camera frame.
   Eigen::Vector3d back_project(const Eigen::Vector2d& pixel, double depth_m) const {
     return {(pixel.x() - cx_px) / fx_px * depth_m, (pixel.y() - cy_px) / fy_px * depth_m, depth_m};

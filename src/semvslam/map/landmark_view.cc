@@ -14,9 +14,7 @@ std::optional<LandmarkView> LandmarkViewer::view(const LandmarkShape& landmark) 
   if (view.in_camera.z() < kNearestDepth) return std::nullopt;
   const Camera& camera = model_.camera();
   view.pixel = camera.project(view.in_camera);
-  if (view.pixel.x() < 0 || view.pixel.y() < 0 || view.pixel.x() >= camera.width_px ||
-      view.pixel.y() >= camera.height_px)
-    return std::nullopt;
+  if (!camera.sees(view.pixel)) return std::nullopt;
   const Eigen::Vector3d ray = landmark.position - centre_;
   const auto distance = static_cast<float>(ray.norm());
   if (distance * kDistanceSlack < landmark.min_distance_m || distance > kDistanceSlack * landmark.max_distance_m)

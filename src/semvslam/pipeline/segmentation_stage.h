@@ -35,7 +35,6 @@ class SegmentationStage {
   /// The first failure, if any.
   Status status() const;
   std::vector<StageSummary> times() const { return timers_.summaries(); }
-  std::string description() const { return segmenter_->description(); }
 
  private:
   SegmentationStage(const Config& config) : damage_(config.damage) {}

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "semvslam/geometry/mask_lookup.h"
+
 namespace semvslam {
 namespace {
 
@@ -11,10 +13,6 @@ using Clock = std::chrono::steady_clock;
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-bool inside(const Camera& camera, const Eigen::Vector2d& pixel) {
-  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < camera.width_px && pixel.y() < camera.height_px;
 }
 
 constexpr double kNearestProjection = 0.05;  // metres before the camera
@@ -158,7 +156,7 @@ bool Tracker::track_motion(const SE3& predicted, double radius_factor) {
     const Eigen::Vector3d in_camera = predicted * in_world;
     if (in_camera.z() < kNearestProjection) continue;
     const Eigen::Vector2d pixel = camera.project(in_camera);
-    if (!inside(camera, pixel)) continue;
+    if (!camera.sees(pixel)) continue;
     const Keypoint& keypoint = last.orb.keypoints[i];
     const float radius =
         static_cast<float>(options_.motion_radius_px * radius_factor) * model_->level_scale(keypoint.level);
@@ -281,9 +279,7 @@ SurfaceCheck Tracker::look_at(const RgbdFrame& frame, const LandmarkView& view) 
   const Camera& camera = model_->camera();
   if (const cv::Mat& excluded = filter_.excluded(); !excluded.empty()) {
     const Eigen::Vector2d recorded = camera.distortion.is_zero() ? view.pixel : camera.distort(view.pixel);
-    const int x = std::clamp(cvRound(recorded.x()), 0, excluded.cols - 1);
-    const int y = std::clamp(cvRound(recorded.y()), 0, excluded.rows - 1);
-    if (excluded.at<std::uint8_t>(y, x) != 0) return SurfaceCheck::kHidden;
+    if (is_masked(excluded, cv::Point2d(recorded.x(), recorded.y()))) return SurfaceCheck::kHidden;
   }
   return check_surface(camera, frame.depth, view.pixel, view.in_camera.z());
 }
