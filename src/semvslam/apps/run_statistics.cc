@@ -63,6 +63,7 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"tracked_share", share},
                {"key_frames", slam.key_frames},
                {"landmarks", slam.landmarks},
+               {"revisits", slam.revisits},
                {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
                {"notices", slam.notices},
                {"stages_ms", stages},

@@ -146,7 +146,7 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
                                                       std::span<const float> depths_m) {
   State& s = *state_;
   DynamicRecord& record = *s.record;
-  s.usable.assign(pixels.size(), 1);
+  s.usable.assign(pixels.size(), kFullyUsed);
   record.features.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) record.features[i].pixel = pixels[i];
   record.moving = s.excluded;
@@ -226,7 +226,7 @@ void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kPointMotion;
     else if (verdicts[i] == MotionVerdict::kStatic)
       mark.verdict = FeatureVerdict::kStatic, mark.reason = FeatureReason::kNone;
-    usable[i] = mark.verdict != FeatureVerdict::kMoving;
+    usable[i] = mark.verdict == FeatureVerdict::kMoving ? kNotUsed : kFullyUsed;
   }
 }
 
@@ -234,11 +234,13 @@ void DynamicFilter::State::open_if_needed(std::span<const float> depths_m) {
   int left = 0, dropped = 0;
   for (std::size_t i = 0; i < depths_m.size(); ++i) {
     if (depths_m[i] <= 0) continue;
-    (usable[i] != 0 ? left : dropped) += 1;
+    (usable[i] != kNotUsed ? left : dropped) += 1;
   }
   if (left >= options.least_features || dropped == 0) return;
-  // Geometry is the first to be doubted: with so little left that agrees, it may have taken the room for the mover.
-  std::fill(usable.begin(), usable.end(), std::uint8_t{1});
+  // Geometry is the first to be doubted: with so little left that agrees, it may have taken the room for the mover. But
+  // a mover that gets into the map drags all later frames along: what comes back may only find landmarks that are
+  // known.
+  std::replace(usable.begin(), usable.end(), std::uint8_t{kNotUsed}, std::uint8_t{kKnownLandmarkOnly});
   record->moving = excluded;
   record->fail_open = FailOpen::kMotion;
 }
@@ -248,7 +250,7 @@ void DynamicFilter::end(const std::optional<SE3>& camera_from_world, std::span<c
   std::size_t left = 0;
   for (std::size_t i = 0; i < s.record->features.size(); ++i) {
     FeatureMark& mark = s.record->features[i];
-    if (s.usable[i] != 0 && left < tracked.size()) mark.tracked = tracked[left++] != 0;
+    if (s.usable[i] != kNotUsed && left < tracked.size()) mark.tracked = tracked[left++] != 0;
     ++s.record->verdicts[static_cast<std::size_t>(mark.verdict)];
     ++s.record->reasons[static_cast<std::size_t>(mark.reason)];
   }
@@ -257,6 +259,10 @@ void DynamicFilter::end(const std::optional<SE3>& camera_from_world, std::span<c
 
 void DynamicFilter::use_motion() {
   if (!state_->motion) state_->motion.emplace(state_->camera, state_->options.motion_options);
+}
+
+void DynamicFilter::forget_poses() {
+  if (state_->motion) state_->motion->forget_poses();
 }
 
 std::shared_ptr<const DynamicRecord> DynamicFilter::record() const { return state_->record; }

@@ -20,7 +20,7 @@ struct DynamicOptions {
   bool motion = false;          // motion consistency
   MaskFitOptions fit;           // of the masks' outlines to the depth image
   int dilate_px = 4;            // masks grow by this: the descriptor of a corner on the outline sees both sides
-  int least_features = 120;     // with depth; with fewer the filter opens
+  int least_features = 60;      // with depth; with fewer the filter opens
   double movable_share = 0.4;   // of the points of an instance of a movable class that move: it is moving
   int movable_points = 4;       // that must move at least
   double movable_hold_s = 1.0;  // it counts as moving for that long after it stopped
@@ -31,6 +31,13 @@ struct DynamicOptions {
   /// Errors of the parts' options that single values cannot show.
   Status check() const;
   bool needs_segmentation() const { return masks != "off"; }
+};
+
+/// What a feature may be used for.
+enum FeatureUse : std::uint8_t {
+  kNotUsed = 0,
+  kFullyUsed = 1,
+  kKnownLandmarkOnly = 2,  // it may be moving, but few others are left: no landmark may come from it
 };
 
 /// The one policy on what may move: puts segmentation, its restoration and motion consistency together and says of
@@ -52,7 +59,7 @@ class DynamicFilter {
   bool relax(int features_with_depth);
 
   /// Verdicts on the features found outside excluded(). @param pixels recorded. @param depths_m as many, 0 = unknown.
-  /// @return per feature whether it may be used.
+  /// @return per feature its FeatureUse.
   const std::vector<std::uint8_t>& judge(std::span<const cv::Point2f> pixels, std::span<const float> depths_m);
 
   /// @param camera_from_world what tracking found; empty = lost. @param tracked per feature that judge() left: a
@@ -60,6 +67,8 @@ class DynamicFilter {
   void end(const std::optional<SE3>& camera_from_world, std::span<const std::uint8_t> tracked);
   /// Motion consistency from the next frame on, whatever the options said.
   void use_motion();
+  /// Poses from before and after cannot be compared: the map was corrected in between.
+  void forget_poses();
 
   /// Of the frame between begin and the next begin.
   std::shared_ptr<const DynamicRecord> record() const;

@@ -13,7 +13,7 @@ struct OrbOptions {
   int levels = 8;              // of the pyramid
   double scale_factor = 1.2;   // between levels
   int fast_threshold = 20;     // grey levels
-  int fast_threshold_low = 7;  // in cells where the first finds nothing
+  int fast_threshold_low = 5;  // in cells where the first finds nothing, as in blurred images
   int cell_px = 32;            // side of the cells that corners are spread over
   bool subpixel = true;  // move corners to the peak of Harris' score, between the pixels (see corner_refinement.h)
 };

@@ -33,6 +33,11 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
   cull_landmarks(id);
   create_landmarks(id);
   times_.create_ms = lap_ms(lap);
+  if (options_.revisit.enabled) {
+    if (const std::optional<Revisit> revisit = find_revisit(map_, id, options_.revisit))
+      revisits_ += close_revisit(map_, id, *revisit);
+    times_.revisit_ms = lap_ms(lap);
+  }
   if (map_.key_frames().size() > 1) {
     fuse_with_neighbours(id);
     times_.fuse_ms = lap_ms(lap);

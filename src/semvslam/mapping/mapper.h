@@ -7,13 +7,14 @@
 #include "semvslam/feature/matching.h"
 #include "semvslam/map/local_map.h"
 #include "semvslam/map/map.h"
+#include "semvslam/mapping/revisit.h"
 #include "semvslam/solve/bundle_adjustment.h"
 
 namespace semvslam {
 
 struct MappingOptions {
   double max_landmark_depth_m = 6.0;  // landmarks are made from depth up to here
-  double min_found_ratio = 0.25;      // found / visible below which a young landmark goes
+  double min_found_ratio = 0.1;       // found / visible below which a young landmark goes; blur hides good ones too
   int young_key_frames = 3;           // a landmark must have three observations after so many key frames
   int fuse_key_frames = 12;           // neighbours in which the new key frame's landmarks are searched, and vice versa
   double fuse_radius_px = 3;          // at level 0
@@ -24,6 +25,7 @@ struct MappingOptions {
   int seen_through = 3;          // frames of that, and more than it was found in: the landmark's place is empty now
   double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others
   LocalMapOptions local_map;
+  RevisitOptions revisit;
 };
 
 /// A key frame as tracking saw it, ready to be put into the map.
@@ -37,7 +39,7 @@ struct NewKeyFrame {
 
 /// Milliseconds of one mapping step, by part.
 struct MappingTimes {
-  double create_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
+  double create_ms = 0, revisit_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
 };
 
 /// The one writer of the map: takes key frames in, makes, fuses, adjusts and culls. Every step works on a bounded
@@ -56,6 +58,8 @@ class Mapper {
 
   const Map& map() const { return map_; }
   const MappingTimes& times() const { return times_; }
+  /// How often drift since an earlier visit was removed.
+  int revisits() const { return revisits_; }
 
  private:
   KeyFrameId insert(const NewKeyFrame& key_frame);
@@ -75,6 +79,7 @@ class Mapper {
   MappingOptions options_;
   Map map_;
   MappingTimes times_;
+  int revisits_ = 0;
   std::vector<LandmarkId> young_;  // ascending
   std::vector<ProjectedQuery> queries_;
   std::vector<Match> matches_;

@@ -83,6 +83,7 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
     local = mapper.step(key_frame);
     const MappingTimes& t = mapper.times();
     timers["mapping.create"].add_ms(t.create_ms);
+    timers["mapping.revisit"].add_ms(t.revisit_ms);
     timers["mapping.fuse"].add_ms(t.fuse_ms);
     timers["mapping.bundle"].add_ms(t.bundle_ms);
     timers["mapping.cull"].add_ms(t.cull_ms);
@@ -312,6 +313,7 @@ SlamStatistics Slam::statistics() const {
   statistics.lost = impl_->lost;
   statistics.key_frames = impl_->mapper.map().key_frames().size();
   statistics.landmarks = impl_->mapper.map().landmark_count();
+  statistics.revisits = static_cast<std::uint64_t>(impl_->mapper.revisits());
   statistics.dynamic = impl_->dynamic;
   statistics.notices = impl_->notices;
   statistics.stages = impl_->timers.summaries();

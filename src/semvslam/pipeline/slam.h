@@ -53,6 +53,7 @@ struct DynamicTotals {
 struct SlamStatistics {
   std::uint64_t frames = 0, tracked = 0, lost = 0;
   std::uint64_t key_frames = 0, landmarks = 0;
+  std::uint64_t revisits = 0;  // times that drift since an earlier visit of a place was removed
   DynamicTotals dynamic;
   std::vector<std::string> notices;  // what went wrong without ending the run, each once
   std::vector<StageSummary> stages;

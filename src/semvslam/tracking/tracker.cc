@@ -15,7 +15,8 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kNearestProjection = 0.05;  // metres before the camera
+constexpr double kNearestProjection = 0.05;             // metres before the camera
+constexpr double kMapJumpM = 0.01, kMapJumpRad = 0.01;  // more than a local bundle adjustment moves the newest frame
 
 }  // namespace
 
@@ -69,7 +70,10 @@ void Tracker::observe(const RgbdFrame& frame, const Segmentation* segmentation, 
   times.extract_ms = take_lap();
   pixels_.clear();
   for (const Keypoint& k : features.orb.keypoints) pixels_.emplace_back(k.x_px, k.y_px);
-  keep_features(filter_.judge(pixels_, features.depth_m), model_->camera(), features);
+  const std::vector<std::uint8_t>& use = filter_.judge(pixels_, features.depth_m);
+  for (std::size_t i = 0; i < use.size(); ++i)
+    if (use[i] == kKnownLandmarkOnly) features.depth_m[i] = 0;  // landmarks and temporary points begin with a depth
+  keep_features(use, model_->camera(), features);
   current_.landmarks.assign(features.size(), LandmarkId());
   is_tracked_.assign(features.size(), 0);
   times.dynamic_ms += take_lap();
@@ -126,8 +130,13 @@ void Tracker::adopt(std::shared_ptr<const LocalMap> local) {
   local_ = std::move(local);
   if (!last_.features) return;
   if (last_relative_) {
-    if (const LocalMap::KeyFramePose* reference = local_->find(last_relative_->reference))
+    if (const LocalMap::KeyFramePose* reference = local_->find(last_relative_->reference)) {
+      const SE3 before = last_.camera_from_world;
       last_.camera_from_world = last_relative_->camera_from_reference * reference->camera_from_world;
+      // Where mapping has removed drift, still things have moved in the world.
+      const SE3 shift = last_.camera_from_world * before.inverse();
+      if (shift.translation().norm() > kMapJumpM || shift.rotation_angle_rad() > kMapJumpRad) filter_.forget_poses();
+    }
   }
   for (LandmarkId& id : last_.landmarks) {
     if (!id.valid()) continue;

@@ -1,0 +1,177 @@
+#include "semvslam/mapping/revisit.h"
+
+#include <algorithm>
+#include <map>
+
+#include "semvslam/feature/matching.h"
+#include "semvslam/map/landmark_view.h"
+#include "semvslam/solve/pnp.h"
+#include "semvslam/solve/pose_graph.h"
+
+namespace semvslam {
+namespace {
+
+constexpr double kMinViewCosine = 0.5;
+constexpr int kStrongLink = 60;  // landmarks that key frames far apart in time must share to hold each other
+/// Neighbours hold each other many times over, by links to every key frame around; one link must outweigh them all.
+constexpr double kRevisitWeight = 1000;
+
+/// Key frames before the newest `recent`, the ones nearest to `id` in place and direction.
+std::vector<KeyFrameId> earlier_key_frames(const Map& map, KeyFrameId id, KeyFrameId first_recent,
+                                           const RevisitOptions& options) {
+  std::vector<KeyFrameId> recent;
+  for (auto it = map.key_frames().lower_bound(first_recent); it != map.key_frames().end(); ++it)
+    recent.push_back(it->first);
+  return nearby_key_frames(map, id,
+                           {.nearby_key_frames = options.key_frames,
+                            .nearby_distance_m = options.distance_m,
+                            .nearby_angle_deg = options.angle_deg},
+                           recent);
+}
+
+double median_shift_px(const Map& map, const Revisit& revisit, const SE3& before) {
+  const Camera& camera = map.model().camera();
+  std::vector<double> shifts;
+  for (const auto& [landmark, feature] : revisit.matches) {
+    const Eigen::Vector3d& p = map.landmark(landmark)->position;
+    shifts.push_back((camera.project(before * p) - camera.project(revisit.camera_from_world * p)).norm());
+  }
+  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
+  std::nth_element(shifts.begin(), middle, shifts.end());
+  return *middle;
+}
+
+PoseGraphProblem::Edge edge(std::uint32_t a, std::uint32_t b, const SE3& a_from_b, double landmarks) {
+  // As if every landmark said 1 cm and 0.3 deg of the relative pose: only the proportions matter.
+  PoseGraphProblem::Edge e{a, b, a_from_b};
+  e.information.diagonal() << 1e4, 1e4, 1e4, 4e4, 4e4, 4e4;
+  e.information *= landmarks;
+  return e;
+}
+
+/// Poses of all key frames (world_from_camera) with the links that hold them; index by key frame.
+PoseGraphProblem essential_graph(const Map& map, std::map<KeyFrameId, std::uint32_t>& index_of) {
+  PoseGraphProblem graph;
+  for (const auto& [id, key_frame] : map.key_frames()) {
+    index_of[id] = static_cast<std::uint32_t>(graph.world_from_pose.size());
+    graph.world_from_pose.push_back(key_frame.camera_from_world.inverse());
+    graph.fixed.push_back(graph.fixed.empty() ? 1 : 0);
+  }
+  const auto link = [&](KeyFrameId a, KeyFrameId b, int shared) {
+    graph.edges.push_back(edge(index_of.at(a), index_of.at(b),
+                               map.key_frame(a)->camera_from_world * map.key_frame(b)->camera_from_world.inverse(),
+                               std::max(shared, 1)));
+  };
+  KeyFrameId previous;
+  for (const auto& [id, key_frame] : map.key_frames()) {
+    int with_previous = 0;
+    for (const Covisible& c : map.covisible(id, 1)) {
+      if (c.key_frame == previous) with_previous = c.shared;
+      if (c.key_frame < id && c.key_frame != previous && c.shared >= kStrongLink) link(c.key_frame, id, c.shared);
+    }
+    if (previous.valid()) link(previous, id, with_previous);
+    previous = id;
+  }
+  return graph;
+}
+
+}  // namespace
+
+void RevisitOptions::add_to(ConfigSchema& s) {
+  s.add("mapping.revisit.enabled", &enabled,
+        "earlier visits of a place are recognised and drift since then is removed");
+  s.add("mapping.revisit.recent_key_frames", &recent_key_frames, {1, 1000},
+        "landmarks that none of so many newest key frames sees belong to an earlier visit");
+  s.add("mapping.revisit.key_frames", &key_frames, {1, 1000}, "key frames of it whose landmarks are searched");
+  s.add("mapping.revisit.distance_m", &distance_m, {0, 100}, "between the camera then and now, m");
+  s.add("mapping.revisit.angle_deg", &angle_deg, {0, 180}, "between the viewing directions, degrees");
+  s.add("mapping.revisit.radius_px", &radius_px, {1, 200}, "search window at level 0, px");
+  s.add("mapping.revisit.min_inliers", &min_inliers, {6, 10000}, "landmarks that must agree with one pose");
+  s.add("mapping.revisit.min_share", &min_share, {0, 1}, "share of the landmarks found that must agree");
+  s.add("mapping.revisit.least_shift_px", &least_shift_px, {0, 100}, "less of a correction is left to fusion, px");
+}
+
+std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options) {
+  const KeyFrame& key_frame = *map.key_frame(id);
+  auto first_recent = map.key_frames().find(id);
+  for (int i = 0; i < options.recent_key_frames && first_recent != map.key_frames().begin(); ++i) --first_recent;
+  const std::vector<KeyFrameId> earlier = earlier_key_frames(map, id, first_recent->first, options);
+  if (earlier.empty()) return std::nullopt;
+  std::vector<LandmarkId> landmarks;
+  for (const KeyFrameId k : earlier)
+    for (const LandmarkId l : map.key_frame(k)->landmarks)
+      if (l.valid() && map.landmark(l)->observations.back().key_frame < first_recent->first) landmarks.push_back(l);
+  std::sort(landmarks.begin(), landmarks.end());
+  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+
+  const LandmarkViewer viewer(map.model(), key_frame.camera_from_world, kMinViewCosine);
+  std::vector<ProjectedQuery> queries;
+  std::vector<LandmarkId> sources;
+  for (const LandmarkId l : landmarks) {
+    const Landmark& landmark = *map.landmark(l);
+    const std::optional<LandmarkView> view =
+        viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
+    if (!view) continue;
+    const float radius = static_cast<float>(options.radius_px) * map.model().level_scale(view->level);
+    queries.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
+                       view->level - 1, view->level + 1, landmark.descriptor, -1.f});
+    sources.push_back(l);
+  }
+  if (queries.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
+  std::vector<Match> matches;
+  match_projected(queries, key_frame.features->orb, key_frame.features->grid,
+                  {.max_distance = 50, .ratio = 0.8f, .check_rotation = false}, matches);
+  if (matches.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
+
+  std::vector<Eigen::Vector3d> points;
+  std::vector<PointObservation> observations;
+  for (const Match& m : matches) {
+    points.push_back(map.landmark(sources[static_cast<std::size_t>(m.query)])->position);
+    observations.push_back(map.model().observation(*key_frame.features, static_cast<std::size_t>(m.feature)));
+  }
+  const Result<PnpEstimate> estimate = estimate_pose(
+      map.model().intrinsics(), points, observations,
+      {.min_inliers = options.min_inliers, .refinement = {.chi2_disparity = map.model().chi2_disparity()}});
+  if (!estimate || estimate->pose.inliers < options.min_share * static_cast<double>(matches.size()))
+    return std::nullopt;
+  Revisit revisit{earlier.front(), estimate->pose.camera_from_world, {}, 0};
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (estimate->inlier[i])
+      revisit.matches.emplace_back(sources[static_cast<std::size_t>(matches[i].query)],
+                                   static_cast<std::uint32_t>(matches[i].feature));
+  if (revisit.matches.empty()) return std::nullopt;
+  revisit.shift_px = median_shift_px(map, revisit, key_frame.camera_from_world);
+  if (revisit.shift_px < options.least_shift_px) return std::nullopt;
+  return revisit;
+}
+
+bool close_revisit(Map& map, KeyFrameId id, const Revisit& revisit) {
+  std::map<KeyFrameId, std::uint32_t> index_of;
+  PoseGraphProblem graph = essential_graph(map, index_of);
+  const std::vector<SE3> before = graph.world_from_pose;
+  const SE3& earlier_from_world = map.key_frame(revisit.earlier)->camera_from_world;
+  graph.edges.push_back(edge(index_of.at(revisit.earlier), index_of.at(id),
+                             earlier_from_world * revisit.camera_from_world.inverse(),
+                             kRevisitWeight * static_cast<double>(revisit.matches.size())));
+  if (!optimize_pose_graph(graph).usable) return false;
+
+  for (const LandmarkId l : map.landmark_ids()) {
+    const Landmark& landmark = *map.landmark(l);
+    // Those of the earlier visit stay with it, whoever saw them since.
+    const std::uint32_t k = index_of.at(landmark.observations.front().key_frame);
+    map.set_position(l, graph.world_from_pose[k] * (before[k].inverse() * landmark.position));
+  }
+  for (const auto& [key_frame, k] : index_of) map.set_pose(key_frame, graph.world_from_pose[k].inverse());
+  for (const LandmarkId l : map.landmark_ids()) map.refresh_geometry(l);
+  for (const auto& [landmark, feature] : revisit.matches) {
+    if (map.landmark(landmark) == nullptr) continue;  // fused into another just now
+    const LandmarkId existing = map.key_frame(id)->landmarks[feature];
+    if (existing.valid())
+      map.fuse_landmarks(existing, landmark);
+    else
+      map.add_observation(landmark, id, feature);
+  }
+  return true;
+}
+
+}  // namespace semvslam
