@@ -269,7 +269,8 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   }
   std::shared_ptr<TruthMaskSink> truth;
   if (!options.truth_masks.empty()) {
-    Result<std::shared_ptr<TruthMaskSink>> opened = TruthMaskSink::open(options.truth_masks, config.orb);
+    Result<std::shared_ptr<TruthMaskSink>> opened =
+        TruthMaskSink::open(options.truth_masks, config.orb, config.dynamic.dilate_px);
     if (!opened) return opened.error();
     truth = std::move(*opened);
     (*slam)->add_sink(truth);

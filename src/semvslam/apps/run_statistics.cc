@@ -75,8 +75,10 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"peak_memory_mb", static_cast<double>(run.peak_memory_bytes) / 1e6}};
   if (run.truth)
     json["truth"] = {{"frames", run.truth->frames},
-                     {"kept_on_moving", run.truth->kept_on_moving_share()},
-                     {"static_dropped", run.truth->static_dropped_share()}};
+                     {"kept_on_moving", run.truth->kept_on_moving.value()},
+                     {"tracked_on_moving", run.truth->tracked_on_moving.value()},
+                     {"static_dropped", run.truth->static_dropped.value()},
+                     {"clear_static_dropped", run.truth->clear_static_dropped.value()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,5 +1,7 @@
 #include "semvslam/apps/truth_masks.h"
 
+#include <opencv2/imgproc.hpp>
+
 #include "semvslam/geometry/mask_lookup.h"
 #include "semvslam/semantic/folder_segmenter.h"
 
@@ -8,7 +10,8 @@ namespace {
 
 class FolderTruth final : public TruthMaskSink {
  public:
-  FolderTruth(std::unique_ptr<Segmenter> masks, const OrbOptions& orb) : masks_(std::move(masks)), extractor_(orb) {}
+  FolderTruth(std::unique_ptr<Segmenter> masks, const OrbOptions& orb, int outline_px)
+      : masks_(std::move(masks)), extractor_(orb), outline_px_(outline_px) {}
 
   void on_frame(const RgbdFrame& frame, const TrackResult& result) override {
     SegmentationRequest request;
@@ -18,39 +21,47 @@ class FolderTruth final : public TruthMaskSink {
     const Result<Segmentation> truth = masks_->segment(request);
     if (!truth) return;
     const cv::Mat moving = truth->mask_of(Role::kStatic);  // whatever its class: all in the folder moves
+    cv::Mat near_moving;
+    cv::dilate(moving, near_moving,
+               cv::getStructuringElement(cv::MORPH_RECT, {2 * outline_px_ + 1, 2 * outline_px_ + 1}));
     ++counts_.frames;
     for (const FeatureMark& mark : result.dynamic->features) {
       if (mark.verdict == FeatureVerdict::kMoving && result.dynamic->fail_open != FailOpen::kMotion) continue;
-      ++counts_.kept;
-      counts_.kept_on_moving += is_masked(moving, mark.pixel);
+      counts_.kept_on_moving.count(is_masked(moving, mark.pixel));
+      if (mark.tracked) counts_.tracked_on_moving.count(is_masked(moving, mark.pixel));
     }
     extractor_.extract(frame.gray, cv::Mat(), whole_);
-    const cv::Mat& dropped = result.dynamic->moving;
     for (const Keypoint& k : whole_.keypoints) {
       const cv::Point2f pixel(k.x_px, k.y_px);
       if (is_masked(moving, pixel)) continue;
-      ++counts_.on_static;
-      counts_.static_dropped += is_masked(dropped, pixel);
+      const bool dropped = is_masked(result.dynamic->moving, pixel);
+      counts_.static_dropped.count(dropped);
+      if (!is_masked(near_moving, pixel)) counts_.clear_static_dropped.count(dropped);
     }
     // Single points outside every mask and region are dropped too.
-    for (const FeatureMark& mark : result.dynamic->features)
-      counts_.static_dropped += mark.reason == FeatureReason::kPointMotion && !is_masked(moving, mark.pixel);
+    for (const FeatureMark& mark : result.dynamic->features) {
+      if (mark.reason != FeatureReason::kPointMotion || is_masked(moving, mark.pixel)) continue;
+      ++counts_.static_dropped.part;
+      counts_.clear_static_dropped.part += !is_masked(near_moving, mark.pixel);
+    }
   }
   const TruthCounts& counts() const override { return counts_; }
 
  private:
   std::unique_ptr<Segmenter> masks_;
   OrbExtractor extractor_;
+  int outline_px_;
   OrbFeatures whole_;
   TruthCounts counts_;
 };
 
 }  // namespace
 
-Result<std::shared_ptr<TruthMaskSink>> TruthMaskSink::open(const std::filesystem::path& folder, const OrbOptions& orb) {
+Result<std::shared_ptr<TruthMaskSink>> TruthMaskSink::open(const std::filesystem::path& folder, const OrbOptions& orb,
+                                                           int outline_px) {
   Result<std::unique_ptr<Segmenter>> masks = FolderSegmenter::open(folder, RoleTable());
   if (!masks) return masks.error();
-  return std::shared_ptr<TruthMaskSink>(std::make_shared<FolderTruth>(std::move(*masks), orb));
+  return std::shared_ptr<TruthMaskSink>(std::make_shared<FolderTruth>(std::move(*masks), orb, outline_px));
 }
 
 }  // namespace semvslam

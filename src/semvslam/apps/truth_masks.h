@@ -12,21 +12,29 @@ namespace semvslam {
 
 /// How well features on moving things were told from those on the static scene.
 struct TruthCounts {
-  std::uint64_t frames = 0;                         // with a true mask
-  std::uint64_t kept = 0, kept_on_moving = 0;       // features that tracking used
-  std::uint64_t on_static = 0, static_dropped = 0;  // features of the whole image on the static scene; not used of them
-
-  double kept_on_moving_share() const { return kept == 0 ? 0 : static_cast<double>(kept_on_moving) / kept; }
-  double static_dropped_share() const { return on_static == 0 ? 0 : static_cast<double>(static_dropped) / on_static; }
+  struct Share {
+    std::uint64_t all = 0, part = 0;
+    void count(bool is_part) { ++all, part += is_part; }
+    double value() const { return all == 0 ? 0 : static_cast<double>(part) / static_cast<double>(all); }
+  };
+  std::uint64_t frames = 0;  // with a true mask
+  Share kept_on_moving;      // of the features that tracking may use
+  Share tracked_on_moving;   // of those that a landmark was found at: the ones that the pose comes from
+  Share static_dropped;      // of the whole image's features on the static scene, those that tracking may not use
+  /// The same of those whose surroundings are static too: a descriptor at an outline sees both sides, and the policy
+  /// drops it by intention.
+  Share clear_static_dropped;
 };
 
 /// Compares what the policy left out with true masks. Extracts the features of every whole image once more to know what
 /// lies under the masks: for measurements only, it costs time.
 class TruthMaskSink : public Sink {
  public:
-  /// @param folder one PNG per frame, non-zero = something that moves; frames without one are not counted. Errors: no
-  /// such folder, no mask in it.
-  static Result<std::shared_ptr<TruthMaskSink>> open(const std::filesystem::path& folder, const OrbOptions& orb);
+  /// @param folder one PNG per frame, non-zero = something that moves; frames without one are not counted.
+  /// @param outline_px how far from anything that moves a feature's surroundings count as static. Errors: no such
+  /// folder, no mask in it.
+  static Result<std::shared_ptr<TruthMaskSink>> open(const std::filesystem::path& folder, const OrbOptions& orb,
+                                                     int outline_px);
   virtual const TruthCounts& counts() const = 0;
 };
 
