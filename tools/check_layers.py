@@ -22,8 +22,8 @@ ALLOWED = {
     "map": {"geometry", "feature", "solve"},  # solve: the plain observation types that the solvers take
     "eval": {"geometry", "data"},
     "place": {"feature", "geometry"},
-    "motion": {"geometry"},
-    "semantic": {"geometry", "data"},
+    "motion": {"feature", "geometry"},
+    "semantic": {"geometry", "data", "feature"},
     "dynamic": {"motion", "semantic", "data", "geometry"},
     "tracking": {"data", "feature", "map", "solve", "dynamic", "geometry"},
     "mapping": {"feature", "map", "solve", "geometry"},

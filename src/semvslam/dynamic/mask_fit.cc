@@ -1,5 +1,6 @@
 #include "semvslam/dynamic/mask_fit.h"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -15,14 +16,26 @@ constexpr float kLeastShare = 0.02f;  // of the window that must be thing with d
 void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, const MaskFitOptions& options) {
   const int half_band = options.band_px / 2;
   if (depth.empty() || depth.size() != mask.size() || half_band < 1) return;
-  const cv::Size half((mask.cols + 1) / 2, (mask.rows + 1) / 2);
-  cv::Mat thing(half, CV_8UC1), depth_m(half, CV_32FC1), inside_m(half, CV_32FC1), inside(half, CV_32FC1);
-  for (int y = 0; y < half.height; ++y) {
-    for (int x = 0; x < half.width; ++x) {
-      const float d = depth_at_m(depth, metres_per_unit, 2 * x, 2 * y);
-      const bool is_thing = mask.at<std::uint8_t>(2 * y, 2 * x) != 0;
-      thing.at<std::uint8_t>(y, x) = is_thing ? 255 : 0;
-      depth_m.at<float>(y, x) = d;
+  const cv::Rect set = cv::boundingRect(mask);
+  if (set.empty()) return;
+  // In half size, of the part of the image that the mask, its band and the averages over it reach.
+  const int side = options.reach_px / 2 | 1;
+  const int room = half_band + side / 2 + 1;
+  const cv::Rect image({}, cv::Size((mask.cols + 1) / 2, (mask.rows + 1) / 2));
+  const cv::Rect window = cv::Rect(cv::Point(set.x / 2 - room, set.y / 2 - room),
+                                   cv::Point((set.br().x + 1) / 2 + room, (set.br().y + 1) / 2 + room)) &
+                          image;
+  cv::Mat thing(window.size(), CV_8UC1), depth_m(window.size(), CV_32FC1), inside_m(window.size(), CV_32FC1),
+      inside(window.size(), CV_32FC1);
+  for (int y = 0; y < window.height; ++y) {
+    const int from_y = 2 * (window.y + y);
+    const std::uint8_t* from = mask.ptr<std::uint8_t>(from_y);
+    std::uint8_t* things = thing.ptr<std::uint8_t>(y);
+    float* depths = depth_m.ptr<float>(y);
+    for (int x = 0; x < window.width; ++x) {
+      const int from_x = 2 * (window.x + x);
+      things[x] = from[from_x] != 0 ? 255 : 0;
+      depths[x] = depth_at_m(depth, metres_per_unit, from_x, from_y);
     }
   }
   // The thing's own depth comes from its core: the rim of a mask may lie on what is behind it.
@@ -30,26 +43,31 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
   const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {2 * half_band + 1, 2 * half_band + 1});
   cv::erode(thing, core, element);
   cv::dilate(thing, widest, element);
-  for (int y = 0; y < half.height; ++y) {
-    for (int x = 0; x < half.width; ++x) {
-      const float d = depth_m.at<float>(y, x);
-      const bool counts = d > 0 && core.at<std::uint8_t>(y, x) != 0;
-      inside.at<float>(y, x) = counts ? 1.f : 0.f;
-      inside_m.at<float>(y, x) = counts ? d : 0.f;
+  for (int y = 0; y < window.height; ++y) {
+    const std::uint8_t* cores = core.ptr<std::uint8_t>(y);
+    const float* depths = depth_m.ptr<float>(y);
+    float *counts = inside.ptr<float>(y), *metres = inside_m.ptr<float>(y);
+    for (int x = 0; x < window.width; ++x) {
+      const bool counted = depths[x] > 0 && cores[x] != 0;
+      counts[x] = counted ? 1.f : 0.f;
+      metres[x] = counted ? depths[x] : 0.f;
     }
   }
-  const int side = options.reach_px / 2 | 1;
   cv::boxFilter(inside, inside, -1, {side, side});
   cv::boxFilter(inside_m, inside_m, -1, {side, side});
-  for (int y = 0; y < half.height; ++y) {
-    for (int x = 0; x < half.width; ++x) {
-      if (widest.at<std::uint8_t>(y, x) == 0 || core.at<std::uint8_t>(y, x) != 0) continue;
-      const float d = depth_m.at<float>(y, x), share = inside.at<float>(y, x);
-      if (d <= 0 || share < kLeastShare) continue;
-      const bool belongs = std::abs(d - inside_m.at<float>(y, x) / share) < static_cast<float>(options.tolerance_m);
-      if (belongs == (thing.at<std::uint8_t>(y, x) != 0)) continue;
-      const cv::Rect block(2 * x, 2 * y, std::min(2, mask.cols - 2 * x), std::min(2, mask.rows - 2 * y));
-      mask(block).setTo(belongs ? 255 : 0);
+  for (int y = 0; y < window.height; ++y) {
+    const std::uint8_t *cores = core.ptr<std::uint8_t>(y), *widests = widest.ptr<std::uint8_t>(y),
+                       *things = thing.ptr<std::uint8_t>(y);
+    const float *depths = depth_m.ptr<float>(y), *shares = inside.ptr<float>(y), *metres = inside_m.ptr<float>(y);
+    const int to_y = 2 * (window.y + y), end_y = std::min(to_y + 2, mask.rows);
+    for (int x = 0; x < window.width; ++x) {
+      if (widests[x] == 0 || cores[x] != 0) continue;
+      if (depths[x] <= 0 || shares[x] < kLeastShare) continue;
+      const bool belongs = std::abs(depths[x] - metres[x] / shares[x]) < static_cast<float>(options.tolerance_m);
+      if (belongs == (things[x] != 0)) continue;
+      const int to_x = 2 * (window.x + x), end_x = std::min(to_x + 2, mask.cols);
+      for (int v = to_y; v < end_y; ++v)
+        for (int u = to_x; u < end_x; ++u) mask.at<std::uint8_t>(v, u) = belongs ? 255 : 0;
     }
   }
 }

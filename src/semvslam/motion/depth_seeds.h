@@ -34,9 +34,11 @@ class DepthSeeds {
     cv::Mat depth;
     SE3 past_from_cur;
   };
-  bool was_empty(const Past& past, const Eigen::Vector3d& point) const;
+  /// @param point in the camera frame of that depth image
+  bool was_empty(const cv::Mat& past_depth, const Eigen::Vector3d& point) const;
 
   Camera camera_;
+  bool bent_;  // by the lens
   MotionCheckOptions options_;
   struct Place {
     cv::Point pixel;

@@ -6,15 +6,15 @@
 #include <cmath>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 #include <stdexcept>
 
 namespace semvslam {
 namespace {
 
-constexpr int kPatchRadiusPx = 4;      // of the appearance check
-constexpr int kFastThreshold = 12;     // grey levels, where corners are searched for here
-constexpr int kFarthestStartPx = 120;  // a predicted position farther from the last one is not believed
+constexpr int kPatchRadiusPx = 4;        // of the appearance check
+constexpr int kTextureRadiusPx = 5;      // of TrackSample::texture
+constexpr int kFastThreshold = 12;       // grey levels, where corners are searched for here
+constexpr float kFarthestStartPx = 120;  // a predicted position farther from the last one is not believed
 
 // Grid of bins as large as the least distance between two points: at most a few points per bin, neighbours suffice.
 class Occupancy {
@@ -22,53 +22,38 @@ class Occupancy {
   Occupancy(int width, int height, int distance)
       : distance_(std::max(1, distance)),
         columns_(width / distance_ + 3),
-        bins_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(height / distance_ + 3)) {}
+        first_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(height / distance_ + 3), kNone) {}
 
   /// Takes the place unless another point is too near.
   bool take(float x, float y) {
     const int bx = static_cast<int>(x) / distance_ + 1, by = static_cast<int>(y) / distance_ + 1;
+    const float squared_limit = static_cast<float>(distance_) * static_cast<float>(distance_);
     for (int dy = -1; dy <= 1; ++dy)
       for (int dx = -1; dx <= 1; ++dx)
-        for (const auto& p : bins_[index(bx + dx, by + dy)])
-          if (std::hypot(p.x - x, p.y - y) < static_cast<float>(distance_)) return false;
-    bins_[index(bx, by)].push_back({x, y});
+        for (int i = first_[index(bx + dx, by + dy)]; i != kNone;) {
+          const Point& p = points_[static_cast<std::size_t>(i)];
+          if ((p.x - x) * (p.x - x) + (p.y - y) * (p.y - y) < squared_limit) return false;
+          i = p.next;
+        }
+    int& first = first_[index(bx, by)];
+    points_.push_back({x, y, first});
+    first = static_cast<int>(points_.size()) - 1;
     return true;
   }
 
  private:
+  static constexpr int kNone = -1;
+  struct Point {
+    float x, y;
+    int next;  // in the same bin
+  };
   std::size_t index(int bx, int by) const {
     return static_cast<std::size_t>(by) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(bx);
   }
   int distance_, columns_;
-  std::vector<std::vector<cv::Point2f>> bins_;
+  std::vector<int> first_;  // per bin
+  std::vector<Point> points_;
 };
-
-float grey_at(const cv::Mat& image, float x, float y) {
-  const int ix = static_cast<int>(x), iy = static_cast<int>(y);
-  const float ax = x - static_cast<float>(ix), ay = y - static_cast<float>(iy);
-  const std::uint8_t* top = image.ptr<std::uint8_t>(iy) + ix;
-  const std::uint8_t* bottom = image.ptr<std::uint8_t>(iy + 1) + ix;
-  return (top[0] * (1 - ax) + top[1] * ax) * (1 - ay) + (bottom[0] * (1 - ax) + bottom[1] * ax) * ay;
-}
-
-// Mean absolute difference of two patches without the difference of their means. Both lie inside with their margin.
-double patch_difference(const cv::Mat& a, const cv::Point2f& at_a, const cv::Mat& b, const cv::Point2f& at_b) {
-  constexpr int kSide = 2 * kPatchRadiusPx + 1, kCount = kSide * kSide;
-  std::array<float, kCount> difference;
-  float mean = 0;
-  int k = 0;
-  for (int dy = -kPatchRadiusPx; dy <= kPatchRadiusPx; ++dy)
-    for (int dx = -kPatchRadiusPx; dx <= kPatchRadiusPx; ++dx, ++k) {
-      const float fx = static_cast<float>(dx), fy = static_cast<float>(dy);
-      difference[static_cast<std::size_t>(k)] =
-          grey_at(a, at_a.x + fx, at_a.y + fy) - grey_at(b, at_b.x + fx, at_b.y + fy);
-      mean += difference[static_cast<std::size_t>(k)];
-    }
-  mean /= kCount;
-  float sum = 0;
-  for (const float d : difference) sum += std::abs(d - mean);
-  return sum / kCount;
-}
 
 // How far the depths around a place lie off a straight surface, the largest of four directions.
 float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, int reach_px, float centre_m) {
@@ -83,26 +68,6 @@ float depth_bend_m(const cv::Mat& depth, float metres_per_unit, int x, int y, in
       bend = std::max(bend, std::abs(std::max(a, b) - centre_m));
   }
   return bend;
-}
-
-// Mean products of the grey value's derivatives over the patch: (xx, xy, yy).
-Eigen::Vector3f texture_of(const cv::Mat& derivatives, const Eigen::Vector2f& pixel) {
-  constexpr int kRadiusPx = 5;
-  constexpr float kScharr = 1.f / 32;  // sum of the filter's weights on one side
-  const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
-  int xx = 0, xy = 0, yy = 0;  // Scharr of 8 bits stays below 2^13: the sums of 121 squares need some of its bits shed
-  for (int v = y - kRadiusPx; v <= y + kRadiusPx; ++v) {
-    const short* row = derivatives.ptr<short>(v) + 2 * (x - kRadiusPx);
-    for (int k = 0; k <= 2 * kRadiusPx; ++k) {
-      const int gx = row[2 * k] >> 2, gy = row[2 * k + 1] >> 2;
-      xx += gx * gx;
-      xy += gx * gy;
-      yy += gy * gy;
-    }
-  }
-  constexpr int kCount = (2 * kRadiusPx + 1) * (2 * kRadiusPx + 1);
-  const float scale = 16 * kScharr * kScharr / kCount;
-  return {static_cast<float>(xx) * scale, static_cast<float>(xy) * scale, static_cast<float>(yy) * scale};
 }
 
 float median_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) {
@@ -181,84 +146,72 @@ void FlowTrack::push(const TrackSample& sample) {
 FlowTracks::FlowTracks(const Camera& camera, const FlowTrackOptions& options) : camera_(camera), options_(options) {
   options_.window_px |= 1;  // odd: a patch has a middle
   options_.border_px = std::max(options_.border_px, kPatchRadiusPx + 2);
+  forward_.window_px = backward_.window_px = options_.window_px;
+  forward_.levels = options_.levels;
+  backward_.levels = std::min(1, options_.levels);
 }
 
 void FlowTracks::reset() {
   tracks_.clear();
   lost_.clear();
-  pyramid_.clear();
-  previous_pyramid_.clear();
+  pyramid_ = previous_pyramid_ = {};
 }
 
 void FlowTracks::step(const MotionFrame& frame) {
   check_frame(frame, camera_);
   lost_.clear();
   std::swap(pyramid_, previous_pyramid_);
-  cv::buildOpticalFlowPyramid(frame.gray, pyramid_, cv::Size(options_.window_px, options_.window_px), options_.levels,
-                              true, cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
-  if (!tracks_.empty() && !previous_pyramid_.empty()) {
-    predict(frame);
-    follow(frame);
-  }
+  pyramid_.build(frame.gray, options_.levels, options_.window_px);
+  if (!tracks_.empty() && !previous_pyramid_.empty()) follow(frame);
   refill(frame);
 }
 
-void FlowTracks::predict(const MotionFrame& frame) {
-  from_.clear();
-  to_.clear();
-  for (const FlowTrack& track : tracks_) {
-    const TrackSample& last = track.newest();
-    from_.emplace_back(last.pixel.x(), last.pixel.y());
-    cv::Point2f start = from_.back();
-    // A point without depth is taken as far away: then rotation alone moves it.
-    if (frame.cur_from_prev) {
-      constexpr double kFarM = 4;
-      const double depth_m = last.depth_m > 0 ? last.depth_m : kFarM;
-      const Eigen::Vector3d point = *frame.cur_from_prev * camera_.back_project(last.ideal.cast<double>(), depth_m);
-      if (point.z() > 0.05) {
-        const Eigen::Vector2d pixel = camera_.distort(camera_.project(point));
-        const cv::Point2f predicted(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-        if (cv::norm(predicted - start) < kFarthestStartPx) start = predicted;
-      }
-    }
-    to_.push_back(start);
-  }
+cv::Point2f FlowTracks::predict(const MotionFrame& frame, const TrackSample& last) const {
+  const cv::Point2f same(last.pixel.x(), last.pixel.y());
+  if (!frame.cur_from_prev) return same;
+  // A point without depth is taken as far away: then rotation alone moves it.
+  constexpr double kFarM = 4;
+  const double depth_m = last.depth_m > 0 ? last.depth_m : kFarM;
+  const Eigen::Vector3d point = *frame.cur_from_prev * camera_.back_project(last.ideal.cast<double>(), depth_m);
+  if (point.z() <= 0.05) return same;
+  const Eigen::Vector2d pixel = camera_.distort(camera_.project(point));
+  const cv::Point2f predicted(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+  return cv::norm(predicted - same) < kFarthestStartPx ? predicted : same;
+}
+
+std::variant<cv::Point2f, TrackLoss> FlowTracks::find(cv::Point2f from, cv::Point2f start) const {
+  cv::Point2f to = start;
+  const bool found = follow_point(previous_pyramid_, pyramid_, from, forward_, to);
+  const float border = static_cast<float>(options_.border_px);
+  if (!(to.x >= border && to.y >= border && to.x < static_cast<float>(camera_.width_px) - border &&
+        to.y < static_cast<float>(camera_.height_px) - border))
+    return TrackLoss::kBorder;
+  if (!found) return TrackLoss::kNotFound;
+  // Back from where it was found, starting off the known answer by the correction that the way here made: a check that
+  // starts at the answer could not fail.
+  cv::Point2f back = from + (to - start);
+  if (!follow_point(pyramid_, previous_pyramid_, to, backward_, back) ||
+      cv::norm(back - from) > options_.max_backward_px)
+    return TrackLoss::kBackward;
+  if (patch_difference(previous_pyramid_, from, pyramid_, to, 2 * kPatchRadiusPx + 1, true) >
+      options_.max_patch_difference)
+    return TrackLoss::kAppearance;
+  return to;
 }
 
 void FlowTracks::follow(const MotionFrame& frame) {
-  const cv::Size window(options_.window_px, options_.window_px);
-  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.03);
-  const std::vector<cv::Point2f> start = to_;
-  cv::calcOpticalFlowPyrLK(previous_pyramid_, pyramid_, from_, to_, found_, error_, window, options_.levels, until,
-                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
-  // Back from where it was found, starting off the known answer by the correction that the way here made: a check that
-  // starts at the answer could not fail.
-  back_.resize(to_.size());
-  for (std::size_t i = 0; i < to_.size(); ++i) back_[i] = from_[i] + (to_[i] - start[i]);
-  cv::calcOpticalFlowPyrLK(pyramid_, previous_pyramid_, to_, back_, found_back_, error_, window,
-                           std::min(1, options_.levels), until, cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
-
   Occupancy occupied(camera_.width_px, camera_.height_px, std::max(2, options_.min_distance_px / 2));
-  const float border = static_cast<float>(options_.border_px);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    const cv::Point2f to = to_[i];
-    std::optional<TrackLoss> loss;
-    if (!(to.x >= border && to.y >= border && to.x < static_cast<float>(camera_.width_px) - border &&
-          to.y < static_cast<float>(camera_.height_px) - border))
-      loss = TrackLoss::kBorder;
-    else if (!found_[i])
-      loss = TrackLoss::kNotFound;
-    else if (!found_back_[i] || cv::norm(back_[i] - from_[i]) > options_.max_backward_px)
-      loss = TrackLoss::kBackward;
-    else if (patch_difference(previous_pyramid_[0], from_[i], pyramid_[0], to) > options_.max_patch_difference)
-      loss = TrackLoss::kAppearance;
-    else if (!occupied.take(to.x, to.y))
-      loss = TrackLoss::kCrowded;
-    if (loss) {
+    const TrackSample& last = tracks_[i].newest();
+    std::variant<cv::Point2f, TrackLoss> went = find({last.pixel.x(), last.pixel.y()}, predict(frame, last));
+    if (const auto* to = std::get_if<cv::Point2f>(&went); to && !occupied.take(to->x, to->y))
+      went = TrackLoss::kCrowded;
+    if (const auto* loss = std::get_if<TrackLoss>(&went)) {
       lost_.push_back({tracks_[i].id(), *loss});
       continue;
     }
+    const auto to = std::get<cv::Point2f>(went);
     tracks_[i].push(make_sample(frame, {to.x, to.y}));
     if (kept != i) tracks_[kept] = tracks_[i];
     ++kept;
@@ -273,10 +226,11 @@ TrackSample FlowTracks::make_sample(const MotionFrame& frame, const Eigen::Vecto
   sample.pixel = pixel;
   sample.ideal = camera_.undistort(pixel.cast<double>()).cast<float>();
   sample.excluded = inside_mask(frame.excluded, pixel);
-  sample.texture = texture_of(pyramid_[1], pixel);
+  const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
+  const cv::Vec3f texture = mean_texture(pyramid_, {x, y}, kTextureRadiusPx);
+  sample.texture = {texture[0], texture[1], texture[2]};
   if (!frame.depth.empty()) {
     const float unit = static_cast<float>(1 / camera_.depth_units_per_m);
-    const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
     sample.depth_m = median_depth_m(frame.depth, unit, x, y);
     if (sample.depth_m > 0)
       sample.depth_spread_m =

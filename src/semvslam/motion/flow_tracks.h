@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "semvslam/base/config_schema.h"
+#include "semvslam/feature/lucas_kanade.h"
 #include "semvslam/geometry/camera.h"
 #include "semvslam/motion/motion_frame.h"
 
@@ -80,8 +82,8 @@ struct FlowTrackOptions {
   void add_to(ConfigSchema& schema);
 };
 
-/// Persistent point tracks: pyramidal Lucas-Kanade flow (Bouguet, 2000; OpenCV's) from frame to frame with checks, and
-/// new points where there are few. The image pyramid of a frame is made once and serves as the previous one next time.
+/// Persistent point tracks: pyramidal Lucas-Kanade flow from frame to frame with checks, and new points where there are
+/// few. The image pyramid of a frame is made once and serves as the previous one next time.
 /// Pure computation; the same calls give the same tracks.
 class FlowTracks {
  public:
@@ -98,7 +100,9 @@ class FlowTracks {
   void reset();
 
  private:
-  void predict(const MotionFrame& frame);
+  cv::Point2f predict(const MotionFrame& frame, const TrackSample& last) const;
+  /// Where a point went, or why it is lost. @param start where it is searched for
+  std::variant<cv::Point2f, TrackLoss> find(cv::Point2f from, cv::Point2f start) const;
   void follow(const MotionFrame& frame);
   void refill(const MotionFrame& frame);
   TrackSample make_sample(const MotionFrame& frame, const Eigen::Vector2f& pixel) const;
@@ -108,11 +112,8 @@ class FlowTracks {
   std::uint32_t next_id_ = 0;
   std::vector<FlowTrack> tracks_;
   std::vector<LostTrack> lost_;
-  std::vector<cv::Mat> pyramid_, previous_pyramid_;
-  // Scratch that is kept to save allocations.
-  std::vector<cv::Point2f> from_, to_, back_;
-  std::vector<std::uint8_t> found_, found_back_;
-  std::vector<float> error_;
+  LucasKanadeOptions forward_, backward_;
+  FlowPyramid pyramid_, previous_pyramid_;
 };
 
 }  // namespace semvslam

@@ -54,7 +54,27 @@ void MotionDetector::judge(std::span<const cv::Point2f> pixels, std::span<const 
                            std::vector<MotionVerdict>& verdicts) const {
   verdicts.assign(pixels.size(), MotionVerdict::kUnknown);
   if (last_.mask.empty()) return;
+  // Tracks with a verdict by square of the image as wide as the radius: those around are in the nine next to it.
+  struct Judged {
+    float x, y, depth_m;
+    MotionVerdict verdict;
+    int next;  // in the same square; -1 = none
+  };
+  constexpr int kSide = static_cast<int>(kJudgeRadiusPx);
+  const int columns = camera_.width_px / kSide + 3, rows = camera_.height_px / kSide + 3;
+  const auto square_of = [&](float x, float y) {
+    return (static_cast<int>(y) / kSide + 1) * columns + static_cast<int>(x) / kSide + 1;
+  };
+  std::vector<int> first(static_cast<std::size_t>(columns * rows), -1);
+  std::vector<Judged> judged;
   const std::vector<FlowTrack>& tracks = tracks_.tracks();
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (last_.check.tracks[k].verdict == MotionVerdict::kUnknown) continue;
+    const TrackSample& sample = tracks[k].newest();
+    int& square = first[static_cast<std::size_t>(square_of(sample.pixel.x(), sample.pixel.y()))];
+    judged.push_back({sample.pixel.x(), sample.pixel.y(), sample.depth_m, last_.check.tracks[k].verdict, square});
+    square = static_cast<int>(judged.size()) - 1;
+  }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const int x = std::clamp(static_cast<int>(std::lround(pixels[i].x)), 0, camera_.width_px - 1);
     const int y = std::clamp(static_cast<int>(std::lround(pixels[i].y)), 0, camera_.height_px - 1);
@@ -62,18 +82,21 @@ void MotionDetector::judge(std::span<const cv::Point2f> pixels, std::span<const 
       verdicts[i] = MotionVerdict::kMoving;
       continue;
     }
-    float nearest = kJudgeRadiusPx;
-    for (std::size_t k = 0; k < tracks.size(); ++k) {
-      const TrackSample& sample = tracks[k].newest();
-      if (last_.check.tracks[k].verdict == MotionVerdict::kUnknown) continue;
-      const float distance = std::hypot(sample.pixel.x() - pixels[i].x, sample.pixel.y() - pixels[i].y);
-      if (distance >= nearest) continue;
-      if (depths_m[i] > 0 && sample.depth_m > 0 &&
-          std::abs(depths_m[i] - sample.depth_m) > kAlikeDepthShare * sample.depth_m)
-        continue;
-      nearest = distance;
-      verdicts[i] = last_.check.tracks[k].verdict;
-    }
+    float nearest = kJudgeRadiusPx * kJudgeRadiusPx;  // squared
+    const int middle = square_of(std::clamp(pixels[i].x, 0.f, static_cast<float>(camera_.width_px - 1)),
+                                 std::clamp(pixels[i].y, 0.f, static_cast<float>(camera_.height_px - 1)));
+    for (const int offset : {-columns - 1, -columns, -columns + 1, -1, 0, 1, columns - 1, columns, columns + 1})
+      for (int k = first[static_cast<std::size_t>(middle + offset)]; k >= 0;) {
+        const Judged& track = judged[static_cast<std::size_t>(k)];
+        k = track.next;
+        const float dx = track.x - pixels[i].x, dy = track.y - pixels[i].y, squared = dx * dx + dy * dy;
+        if (squared >= nearest) continue;
+        if (depths_m[i] > 0 && track.depth_m > 0 &&
+            std::abs(depths_m[i] - track.depth_m) > kAlikeDepthShare * track.depth_m)
+          continue;
+        nearest = squared;
+        verdicts[i] = track.verdict;
+      }
   }
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
 #include "semvslam/data/frame.h"
 #include "semvslam/semantic/mask_motion.h"
@@ -182,7 +181,7 @@ float share_inside(const HalfMask& object, cv::Point2f shift, cv::Size half_size
 
 struct CarryFrame::Cache {
   cv::Mat half_depth_m;
-  std::vector<cv::Mat> pyramid;
+  FlowPyramid pyramid;
 };
 
 CarryFrame::CarryFrame(const Camera& camera, cv::Mat gray, cv::Mat depth)
@@ -208,12 +207,12 @@ const cv::Mat& CarryFrame::half_depth_m() const {
   return half;
 }
 
-const std::vector<cv::Mat>& CarryFrame::pyramid() const {
-  std::vector<cv::Mat>& pyramid = cache_->pyramid;
+const FlowPyramid& CarryFrame::pyramid() const {
+  FlowPyramid& pyramid = cache_->pyramid;
   if (!pyramid.empty() || gray_.empty()) return pyramid;
   cv::Mat half;
   cv::resize(gray_, half, half_size(), 0, 0, cv::INTER_AREA);
-  cv::buildOpticalFlowPyramid(half, pyramid, cv::Size(kFlowWindowPx, kFlowWindowPx), kFlowLevels, true);
+  pyramid.build(half, kFlowLevels, kFlowWindowPx);
   return pyramid;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "semvslam/base/config_schema.h"
+#include "semvslam/feature/flow_pyramid.h"
 #include "semvslam/geometry/camera.h"
 #include "semvslam/geometry/se3.h"
 
@@ -36,8 +37,8 @@ class CarryFrame {
   cv::Size half_size() const { return {(size_.width + 1) / 2, (size_.height + 1) / 2}; }
   /// CV_32FC1, m, half the width and height (every second pixel); 0 = none. Empty where there is no depth.
   const cv::Mat& half_depth_m() const;
-  /// LK pyramid of the half-size image; empty where there is no gray image.
-  const std::vector<cv::Mat>& pyramid() const;
+  /// Of the half-size image; empty where there is no gray image.
+  const FlowPyramid& pyramid() const;
 
  private:
   struct Cache;

@@ -4,8 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/video/tracking.hpp>
 #include <vector>
+
+#include "semvslam/feature/lucas_kanade.h"
 
 namespace semvslam {
 namespace {
@@ -26,12 +27,21 @@ float median(std::vector<float> values) {
   return *middle;
 }
 
+/// Of the grey gradient by Scharr's filter, |x| + |y|.
+int gradient_strength(const cv::Mat& image, int x, int y) {
+  const auto stride = static_cast<std::ptrdiff_t>(image.step[0]);
+  const std::uint8_t *row = image.data + y * stride + x, *above = row - stride, *below = row + stride;
+  const int gx = 3 * (above[1] + below[1] - above[-1] - below[-1]) + 10 * (row[1] - row[-1]);
+  const int gy = 3 * (below[-1] + below[1] - above[-1] - above[1]) + 10 * (below[0] - above[0]);
+  return std::abs(gx) + std::abs(gy);
+}
+
 /// Points spread evenly over the mask, in each cell of a grid the one with the strongest gradient, none at the rim:
 /// there LK holds on to what is behind.
-std::vector<cv::Point2f> choose_points(const HalfMask& object, const std::vector<cv::Mat>& pyramid, int wanted) {
+/// @param image with a readable margin (FlowPyramid); null = any point is as good.
+std::vector<cv::Point2f> choose_points(const HalfMask& object, const cv::Mat* image, int wanted) {
   const int step = std::max(4, static_cast<int>(std::sqrt(static_cast<double>(object.pixels) / wanted)));
   const int rim = std::min(3, step / 3);
-  const cv::Mat gradient = pyramid.empty() ? cv::Mat() : pyramid[1];  // CV_16SC2, built along with the pyramid
   std::vector<cv::Point2f> out;
   const auto inside = [&](int x, int y) {
     return x >= 0 && y >= 0 && x < object.mask.cols && y < object.mask.rows && object.mask.at<std::uint8_t>(y, x) != 0;
@@ -44,11 +54,7 @@ std::vector<cv::Point2f> choose_points(const HalfMask& object, const std::vector
         for (int x = left; x < std::min(left + step, object.mask.cols); x += 2) {
           if (!inside(x, y) || !inside(x - rim, y) || !inside(x + rim, y) || !inside(x, y - rim) || !inside(x, y + rim))
             continue;
-          int strength = 0;
-          if (!gradient.empty()) {
-            const cv::Vec2s g = gradient.at<cv::Vec2s>(object.window.y + y, object.window.x + x);
-            strength = std::abs(g[0]) + std::abs(g[1]);
-          }
+          const int strength = image ? gradient_strength(*image, object.window.x + x, object.window.y + y) : 0;
           if (strength <= best) continue;
           best = strength;
           at = {x, y};
@@ -98,26 +104,27 @@ cv::Point2f median_shift(const std::vector<Pair>& pairs) {
 
 std::vector<Pair> pairs_by_flow(const CarryFrame& from, const CarryFrame& to, const std::vector<cv::Point2f>& points,
                                 cv::Point2f start) {
-  std::vector<cv::Point2f> found;
-  for (const cv::Point2f& p : points) found.push_back(p + start);
-  std::vector<std::uint8_t> status;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(from.pyramid(), to.pyramid(), points, found, status, error,
-                           cv::Size(CarryFrame::kFlowWindowPx, CarryFrame::kFlowWindowPx), CarryFrame::kFlowLevels,
-                           cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 12, 0.05),
-                           cv::OPTFLOW_USE_INITIAL_FLOW, 1e-4);
-  const cv::Size size = to.pyramid()[0].size();
+  LucasKanadeOptions options;
+  options.window_px = CarryFrame::kFlowWindowPx;
+  options.levels = CarryFrame::kFlowLevels;
+  options.epsilon_px = 0.05;
+  const cv::Size size = to.pyramid().level(0).size();
+  std::vector<Pair> found;
   std::vector<float> errors;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    if (status[i]) errors.push_back(error[i]);
+  for (const cv::Point2f& p : points) {
+    cv::Point2f q = p + start;
+    if (!follow_point(from.pyramid(), to.pyramid(), p, options, q)) continue;
+    if (q.x < 0 || q.y < 0 || q.x > static_cast<float>(size.width) - 1 || q.y > static_cast<float>(size.height) - 1)
+      continue;
+    found.push_back({p, q});
+    errors.push_back(patch_difference(from.pyramid(), p, to.pyramid(), q, options.window_px, false));
+  }
   const float limit = std::max(8.f, 3.f * median(errors));  // grey levels
   std::vector<Pair> out;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const cv::Point2f q = found[i];
-    if (!status[i] || error[i] > limit || q.x < 0 || q.y < 0 || q.x > size.width - 1.f || q.y > size.height - 1.f)
-      continue;
-    Pair pair{points[i], q};
-    const float before = depth_at(from.half_depth_m(), points[i]), now = depth_at(to.half_depth_m(), q);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (errors[i] > limit) continue;
+    Pair pair = found[i];
+    const float before = depth_at(from.half_depth_m(), pair.from), now = depth_at(to.half_depth_m(), pair.to);
     pair.has_depth = before > 0 && now > 0;
     if (pair.has_depth) pair.depth_change_m = now - before;
     out.push_back(pair);
@@ -154,7 +161,7 @@ Affine fit_affine(const std::vector<Pair>& pairs) {
   return out;
 }
 
-float distance(cv::Point2f a, cv::Point2f b) { return std::hypot(a.x - b.x, a.y - b.y); }
+float distance(cv::Point2f a, cv::Point2f b) { return std::sqrt((a - b).dot(a - b)); }
 
 /// Drops what moves unlike the rest and unlike its neighbours, and what lands on another depth.
 std::vector<Pair> consistent(std::vector<Pair> pairs, Affine& affine) {
@@ -172,7 +179,7 @@ std::vector<Pair> consistent(std::vector<Pair> pairs, Affine& affine) {
     std::vector<float> sizes;
     for (const Pair& p : pairs) {
       rest.push_back(p.from - p.to - affine(p.to));
-      sizes.push_back(std::hypot(rest.back().x, rest.back().y));
+      sizes.push_back(std::sqrt(rest.back().dot(rest.back())));
     }
     const float limit = std::max(1.5f, 3.f * median(sizes));
     std::vector<Pair> kept;
@@ -241,7 +248,7 @@ MaskMotion estimate_motion(const Camera& camera, const MaskCarryOptions& options
   Affine affine;
   if (options.motion != "none") {
     const std::vector<cv::Point2f> points =
-        choose_points(object, flow ? from.pyramid() : std::vector<cv::Mat>(), options.points);
+        choose_points(object, flow ? &from.pyramid().level(0) : nullptr, options.points);
     if (to_from) {
       pairs = pairs_by_pose(camera, from.half_depth_m(), points, *to_from);
       if (guess == cv::Point2f() && !pairs.empty()) out.shift = median_shift(pairs);
