@@ -123,8 +123,8 @@ TEST(LucasKanade, EveryWindowFollows) {
 }
 
 TEST(LucasKanade, FollowsATurnAndAZoom) {
-  // Image point p shows texture point centre + m (p - centre): it comes from there in the first image. A mere shift of a
-  // patch is not quite that: the bound is what remains.
+  // Image point p shows texture point centre + m (p - centre): it comes from there in the first image. A mere shift of
+  // a patch is not quite that: the bound is what remains.
   const double angle = 0.03, zoom = 1.02;
   const cv::Matx22d m(zoom * std::cos(angle), -zoom * std::sin(angle), zoom * std::sin(angle), zoom * std::cos(angle));
   const cv::Vec2d centre(320, 240), rest = centre - m * centre;
