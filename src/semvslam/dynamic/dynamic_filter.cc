@@ -105,8 +105,12 @@ void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool
 
 void DynamicFilter::State::dilate(cv::Mat& mask) const {
   if (options.dilate_px <= 0) return;
-  const int side = 2 * options.dilate_px + 1;
-  cv::dilate(mask, mask, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+  const cv::Rect set = cv::boundingRect(mask);
+  if (set.empty()) return;
+  const int reach = options.dilate_px, side = 2 * reach + 1;
+  cv::Mat part = mask(cv::Rect(set.x - reach, set.y - reach, set.width + 2 * reach, set.height + 2 * reach) &
+                      cv::Rect(cv::Point(), mask.size()));
+  cv::dilate(part, part, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
 }
 
 void DynamicFilter::State::compose_mask() {

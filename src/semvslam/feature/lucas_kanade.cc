@@ -8,6 +8,10 @@
 #include <stdexcept>
 #include <type_traits>
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 namespace semvslam {
 namespace {
 
@@ -22,8 +26,8 @@ constexpr int kChunk = 112;
 static_assert(255 * kMaxGradient * kMaxWindow * kMaxWindow < std::int64_t{1} << 31);
 static_assert(kMaxGradient * kMaxGradient * kChunk < std::int64_t{1} << 31);
 
-/// Rows of a patch, each in whole blocks of lanes, and one row more; what reads a lane ahead may run into the next.
-using Rows = std::array<std::int16_t, (kMaxWindow + 2) * kMaxLanes>;
+/// Rows of a patch, each in whole blocks of lanes, with up to three rows more.
+using Rows = std::array<std::int16_t, (kMaxWindow + 3) * kMaxLanes>;
 
 /// A patch between pixels: its first whole pixel and the rest of the way, 0 <= rest < 1.
 struct Place {
@@ -55,22 +59,50 @@ void interpolate(std::int16_t* __restrict rows, const Place& place, int height, 
   for (int i = 0; i < n; ++i) out[i] = mix(rows[i], below[i], fy);
 }
 
+/// Pixels as 16-bit numbers. GCC 12 makes four instructions of what is one.
+inline void widen(const std::uint8_t* from, std::int16_t* to) {
+#ifdef __AVX2__
+  const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(from));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_cvtepu8_epi16(bytes));
+#else
+  for (int i = 0; i < 16; ++i) to[i] = from[i];
+#endif
+}
+
+template <int kLanes>
+void load(const cv::Mat& image, int left, int top, int height, std::int16_t* out) {
+  const auto stride = static_cast<std::ptrdiff_t>(image.step[0]);
+  const std::uint8_t* row = image.data + top * stride + left;
+  for (int r = 0; r < height; ++r, row += stride)
+    for (int i = 0; i < kLanes; i += 16) widen(row + i, out + r * kLanes + i);
+}
+
+/// The pixels around a patch: those of its columns and those to their left and right; a row above, two below.
+struct Surroundings {
+  Rows left, middle, right;
+};
+
+template <int kLanes>
+void load_surroundings(const cv::Mat& image, int left, int top, int height, Surroundings& out) {
+  load<kLanes>(image, left - 1, top - 1, height + 2, out.left.data());
+  load<kLanes>(image, left, top - 1, height + 2, out.middle.data());
+  load<kLanes>(image, left + 1, top - 1, height + 2, out.right.data());
+}
+
 /// Scharr's gradients at whole pixels, `height` rows.
 template <int kLanes>
-void gradients(const cv::Mat& image, int left, int top, int height, std::int16_t* __restrict gx,
-               std::int16_t* __restrict gy) {
-  const auto stride = static_cast<std::ptrdiff_t>(image.step[0]);
-  for (int r = 0; r < height; ++r) {
-    const std::uint8_t *row = image.data + (top + r) * stride + left, *above = row - stride, *below = row + stride;
+void gradients(const Surroundings& pixels, int height, std::int16_t* __restrict gx, std::int16_t* __restrict gy) {
+  const std::int16_t *left = pixels.left.data(), *middle = pixels.middle.data(), *right = pixels.right.data();
+  const int n = height * kLanes;
+  constexpr int kRow = kLanes, kBelow = 2 * kLanes;
 #pragma GCC ivdep
-    for (int i = 0; i < kLanes; ++i) {
-      const auto outer_x = static_cast<std::int16_t>((above[i + 1] + below[i + 1]) - (above[i - 1] + below[i - 1]));
-      const auto inner_x = static_cast<std::int16_t>(row[i + 1] - row[i - 1]);
-      const auto outer_y = static_cast<std::int16_t>((below[i - 1] + below[i + 1]) - (above[i - 1] + above[i + 1]));
-      const auto inner_y = static_cast<std::int16_t>(below[i] - above[i]);
-      gx[r * kLanes + i] = static_cast<std::int16_t>(3 * outer_x + 10 * inner_x);
-      gy[r * kLanes + i] = static_cast<std::int16_t>(3 * outer_y + 10 * inner_y);
-    }
+  for (int i = 0; i < n; ++i) {
+    const auto outer_x = static_cast<std::int16_t>((right[i] + right[i + kBelow]) - (left[i] + left[i + kBelow]));
+    const auto inner_x = static_cast<std::int16_t>(right[i + kRow] - left[i + kRow]);
+    const auto outer_y = static_cast<std::int16_t>((left[i + kBelow] + right[i + kBelow]) - (left[i] + right[i]));
+    const auto inner_y = static_cast<std::int16_t>(middle[i + kBelow] - middle[i]);
+    gx[i] = static_cast<std::int16_t>(3 * outer_x + 10 * inner_x);
+    gy[i] = static_cast<std::int16_t>(3 * outer_y + 10 * inner_y);
   }
 }
 
@@ -126,20 +158,10 @@ struct Sums {
   Bilinear x, y;
 };
 
-/// For places from that pixel on.
+/// @param a from the patch's first pixel on, one row more than it has. @param b their neighbours to the right.
 template <int kLanes>
-Sums correlate(const cv::Mat& image, int left, int top, const Template& patch) {
-  Rows pixels, next;  // and their neighbours to the right
-  for (int r = 0; r <= patch.window; ++r) {
-    const std::uint8_t* row = image.data + (top + r) * static_cast<std::ptrdiff_t>(image.step[0]) + left;
-#pragma GCC ivdep
-    for (int i = 0; i < kLanes; ++i) {
-      pixels[static_cast<std::size_t>(r * kLanes + i)] = row[i];
-      next[static_cast<std::size_t>(r * kLanes + i)] = row[i + 1];
-    }
-  }
-  const std::int16_t *gx = patch.gx.data(), *gy = patch.gy.data(), *a = pixels.data(), *b = next.data(),
-                     *c = a + kLanes, *d = b + kLanes;
+Sums correlate(const std::int16_t* a, const std::int16_t* b, const Template& patch) {
+  const std::int16_t *gx = patch.gx.data(), *gy = patch.gy.data(), *c = a + kLanes, *d = b + kLanes;
   std::int32_t ax = 0, ay = 0, bx = 0, by = 0, cx = 0, cy = 0, dx = 0, dy = 0;
   const int n = patch.window * kLanes;
   for (int i = 0; i < n; ++i) {
@@ -160,8 +182,10 @@ template <int kLanes>
 bool prepare(const cv::Mat& image, cv::Point2f at, double least_texture, Template& patch) {
   const Place place = place_of(at, patch.window / 2);
   const int n = patch.window * kLanes;
+  Surroundings pixels;
+  load_surroundings<kLanes>(image, place.x, place.y, patch.window + 1, pixels);
   Rows whole_x, whole_y;
-  gradients<kLanes>(image, place.x, place.y, patch.window + 1, whole_x.data(), whole_y.data());
+  gradients<kLanes>(pixels, patch.window + 1, whole_x.data(), whole_y.data());
   whole_x[static_cast<std::size_t>(n + kLanes)] = whole_y[static_cast<std::size_t>(n + kLanes)] =
       0;  // is read, not used
   interpolate<kLanes>(whole_x.data(), place, patch.window, patch.gx.data());
@@ -178,7 +202,7 @@ bool prepare(const cv::Mat& image, cv::Point2f at, double least_texture, Templat
   patch.inverse_xx = yy * scale;
   patch.inverse_xy = -xy * scale;
   patch.inverse_yy = xx * scale;
-  const Sums sums = correlate<kLanes>(image, place.x, place.y, patch);
+  const Sums sums = correlate<kLanes>(pixels.middle.data() + kLanes, pixels.right.data() + kLanes, patch);
   patch.sum_x = sums.x(place.rest_x, place.rest_y);
   patch.sum_y = sums.y(place.rest_x, place.rest_y);
   return true;
@@ -197,6 +221,7 @@ bool search(const cv::Mat& image, const Template& patch, const LucasKanadeOption
   constexpr float kSwinging_px = 0.01f;  // two steps that cancel
   const int radius = patch.window / 2;
   const auto epsilon = static_cast<float>(options.epsilon_px);
+  Rows pixels, next;
   Place cell;
   Bilinear step_x, step_y;  // from every place of the cell
   cv::Point2f before;
@@ -204,7 +229,9 @@ bool search(const cv::Mat& image, const Template& patch, const LucasKanadeOption
     if (!is_near(image, found, radius)) return false;
     const Place place = place_of(found, radius);
     if (k == 0 || place.x != cell.x || place.y != cell.y) {
-      Sums sums = correlate<kLanes>(image, place.x, place.y, patch);
+      load<kLanes>(image, place.x, place.y, patch.window + 1, pixels.data());
+      load<kLanes>(image, place.x + 1, place.y, patch.window + 1, next.data());
+      Sums sums = correlate<kLanes>(pixels.data(), next.data(), patch);
       sums.x.s[0] -= patch.sum_x;
       sums.y.s[0] -= patch.sum_y;
       for (std::size_t i = 0; i < 4; ++i) {
@@ -249,12 +276,8 @@ bool follow(const FlowPyramid& from, const FlowPyramid& to, cv::Point2f at, cons
 template <int kLanes>
 void sample(const cv::Mat& image, const Place& place, int height, std::int16_t* __restrict out) {
   Rows whole;
-  for (int r = 0; r <= height; ++r) {
-    const std::uint8_t* row = image.data + (place.y + r) * static_cast<std::ptrdiff_t>(image.step[0]) + place.x;
-#pragma GCC ivdep
-    for (int i = 0; i < kLanes; ++i)
-      whole[static_cast<std::size_t>(r * kLanes + i)] = static_cast<std::int16_t>(row[i] * 64);
-  }
+  load<kLanes>(image, place.x, place.y, height + 1, whole.data());
+  for (int i = 0; i < (height + 1) * kLanes; ++i) whole[static_cast<std::size_t>(i)] *= 64;
   whole[static_cast<std::size_t>((height + 1) * kLanes)] = 0;  // is read, not used
   interpolate<kLanes>(whole.data(), place, height, out);
 }
@@ -302,8 +325,10 @@ cv::Vec3f mean_texture(const FlowPyramid& pyramid, cv::Point pixel, int radius_p
   constexpr int kLanes = 16;
   const int side = 2 * radius_px + 1;
   if (side < 1 || side > 15) throw std::invalid_argument("mean_texture: the radius must be 0..7");
+  Surroundings pixels;
+  load_surroundings<kLanes>(pyramid.level(0), pixel.x - radius_px, pixel.y - radius_px, side, pixels);
   std::array<std::int16_t, 15 * kLanes> gx, gy;
-  gradients<kLanes>(pyramid.level(0), pixel.x - radius_px, pixel.y - radius_px, side, gx.data(), gy.data());
+  gradients<kLanes>(pixels, side, gx.data(), gy.data());
   clear_beside<kLanes>(gx.data(), side);
   clear_beside<kLanes>(gy.data(), side);
   const Moments m = moments(gx.data(), gy.data(), side * kLanes);
