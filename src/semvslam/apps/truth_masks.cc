@@ -1,7 +1,6 @@
 #include "semvslam/apps/truth_masks.h"
 
-#include <opencv2/imgproc.hpp>
-
+#include "semvslam/dynamic/mask_fit.h"
 #include "semvslam/geometry/mask_lookup.h"
 #include "semvslam/semantic/folder_segmenter.h"
 
@@ -21,9 +20,8 @@ class FolderTruth final : public TruthMaskSink {
     const Result<Segmentation> truth = masks_->segment(request);
     if (!truth) return;
     const cv::Mat moving = truth->mask_of(Role::kStatic);  // whatever its class: all in the folder moves
-    cv::Mat near_moving;
-    cv::dilate(moving, near_moving,
-               cv::getStructuringElement(cv::MORPH_RECT, {2 * outline_px_ + 1, 2 * outline_px_ + 1}));
+    cv::Mat near_moving = moving.clone();
+    grow_mask(near_moving, outline_px_);
     ++counts_.frames;
     for (const FeatureMark& mark : result.dynamic->features) {
       if (mark.verdict == FeatureVerdict::kMoving && result.dynamic->fail_open != FailOpen::kMotion) continue;

@@ -28,7 +28,6 @@ struct DynamicFilter::State {
   void mark_features(std::span<const cv::Point2f> pixels);
   void open_if_needed(std::span<const float> depths_m);
   void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
-  void dilate(cv::Mat& mask) const;
 
   const Camera camera;
   const DynamicOptions options;
@@ -103,16 +102,6 @@ void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool
   if (window == instance.window && !window.empty()) target(window).setTo(255, instance.mask);
 }
 
-void DynamicFilter::State::dilate(cv::Mat& mask) const {
-  if (options.dilate_px <= 0) return;
-  const cv::Rect set = cv::boundingRect(mask);
-  if (set.empty()) return;
-  const int reach = options.dilate_px, side = 2 * reach + 1;
-  cv::Mat part = mask(cv::Rect(set.x - reach, set.y - reach, set.width + 2 * reach, set.height + 2 * reach) &
-                      cv::Rect(cv::Point(), mask.size()));
-  cv::dilate(part, part, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
-}
-
 void DynamicFilter::State::compose_mask() {
   excluded = cv::Mat();
   const bool boxes = options.masks == "boxes";
@@ -131,7 +120,7 @@ void DynamicFilter::State::compose_mask() {
     else
       cv::bitwise_or(excluded, frame.mask, excluded);
   }
-  if (!excluded.empty()) dilate(excluded);
+  if (!excluded.empty()) grow_mask(excluded, options.dilate_px);
   record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
 }
 
@@ -184,7 +173,7 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
   for (cv::Mat* mask : {&regions_mask, &instances_mask}) {
     if (mask->empty()) continue;
-    dilate(*mask);
+    grow_mask(*mask, options.dilate_px);
     cv::bitwise_or(record->moving, *mask, record->moving);
   }
 }

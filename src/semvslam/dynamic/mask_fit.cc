@@ -72,4 +72,14 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
   }
 }
 
+void grow_mask(cv::Mat& mask, int reach_px) {
+  if (reach_px <= 0) return;
+  const cv::Rect set = cv::boundingRect(mask);
+  if (set.empty()) return;
+  const int side = 2 * reach_px + 1;
+  cv::Mat part = mask(cv::Rect(set.x - reach_px, set.y - reach_px, set.width + side - 1, set.height + side - 1) &
+                      cv::Rect(cv::Point(), mask.size()));
+  cv::dilate(part, part, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+}
+
 }  // namespace semvslam

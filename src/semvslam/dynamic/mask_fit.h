@@ -17,4 +17,8 @@ struct MaskFitOptions {
 /// empty: then nothing changes. @param metres_per_unit of a 16-bit depth.
 void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, const MaskFitOptions& options);
 
+/// Sets every pixel that is at most `reach_px` rows and columns from one that is set. @param mask CV_8UC1, changed in
+/// place; may be all zero.
+void grow_mask(cv::Mat& mask, int reach_px);
+
 }  // namespace semvslam

@@ -56,5 +56,18 @@ TEST_F(MaskFitTest, ReadsSixteenBitDepthInItsUnits) {
   EXPECT_EQ(difference(by_units, by_metres), 0);
 }
 
+TEST(GrowMask, ReachesAsFarAsSaidAndNotAcrossTheBorder) {
+  cv::Mat mask = cv::Mat::zeros(40, 60, CV_8UC1);
+  mask.at<std::uint8_t>(2, 1) = 255;
+  mask.at<std::uint8_t>(20, 30) = 255;
+  grow_mask(mask, 3);
+  EXPECT_EQ(cv::countNonZero(mask), 7 * 7 + 6 * 5) << "7x7, and what is left of it at the corner";
+  EXPECT_EQ(mask.at<std::uint8_t>(17, 27), 255);
+  EXPECT_EQ(mask.at<std::uint8_t>(16, 27), 0);
+  cv::Mat nothing = cv::Mat::zeros(40, 60, CV_8UC1);
+  grow_mask(nothing, 3);
+  EXPECT_EQ(cv::countNonZero(nothing), 0);
+}
+
 }  // namespace
 }  // namespace semvslam
