@@ -185,7 +185,9 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
 void Mapper::adjust_all(std::stop_token stop) {
   std::vector<KeyFrameId> window;
   for (const auto& [id, key_frame] : map_.key_frames()) window.push_back(id);
-  if (window.size() > 1) adjust(window, stop);
+  // What bends a whole map (drift that a revisit has spread) gains little per step: five steps would leave most of it.
+  if (window.size() > 1)
+    adjust(window, {.robust_iterations = 25, .final_iterations = 15, .relative_cost_tolerance = 1e-6}, stop);
 }
 
 void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
@@ -194,10 +196,10 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
     if (window.size() >= static_cast<std::size_t>(options_.bundle_key_frames)) break;
     window.push_back(c.key_frame);
   }
-  adjust(window, stop);
+  adjust(window, {}, stop);
 }
 
-void Mapper::adjust(const std::vector<KeyFrameId>& window, std::stop_token stop) {
+void Mapper::adjust(const std::vector<KeyFrameId>& window, BaOptions options, std::stop_token stop) {
   std::vector<LandmarkId> landmarks;
   for (const KeyFrameId k : window)
     for (const LandmarkId l : map_.key_frame(k)->landmarks)
@@ -245,8 +247,8 @@ void Mapper::adjust(const std::vector<KeyFrameId>& window, std::stop_token stop)
     }
   }
   std::vector<std::uint8_t> edge_inlier;
-  const BaSummary summary =
-      adjust_bundle(problem, {.chi2_disparity = map_.model().chi2_disparity()}, edge_inlier, stop);
+  options.chi2_disparity = map_.model().chi2_disparity();
+  const BaSummary summary = adjust_bundle(problem, options, edge_inlier, stop);
   if (!summary.usable) return;
   for (const KeyFrameId k : window) map_.set_pose(k, problem.poses[index_of.at(k)]);
   for (std::size_t i = 0; i < landmarks.size(); ++i) map_.set_position(landmarks[i], problem.points[i]);

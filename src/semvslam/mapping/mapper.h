@@ -72,7 +72,7 @@ class Mapper {
   void adjust_neighbourhood(KeyFrameId id, std::stop_token stop);
   /// Bundle adjustment of the key frames in `window` and all landmarks they see; others that see them hold them in
   /// place.
-  void adjust(const std::vector<KeyFrameId>& window, std::stop_token stop);
+  void adjust(const std::vector<KeyFrameId>& window, BaOptions options, std::stop_token stop);
   void cull_key_frames(KeyFrameId newest);
   bool is_redundant(const KeyFrame& key_frame) const;
 
