@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the model card from model.json, the training logs and what evaluate.py measured, so that no number is typed by hand.
 
-usage: card.py MODEL_DIR SCORES.json TRAINING_LOG.jsonl... [--rendered JSON]    a log per run, the last with the second stage
+usage: card.py MODEL_DIR SCORES.json TRAINING_LOG.jsonl... [--rendered JSON]    a log per run, in their order
 """
 import argparse
 import json
@@ -44,7 +44,7 @@ def main():
     runs = [read_rows(path) for path in o.logs]
     rows = [r for r in runs[-1] if "all" in r]
     steps, seen = (sum(max(r[k] for r in run if k in r) for run in runs) for k in ("step", "seen"))
-    in_second = max(r["step"] for r in rows) - next(r["step"] for r in runs[-1] if "second_stage" in r)
+    last_seen = max(r["seen"] for r in rows)
     c = s["coco"]
     size = m["input"]
     out = f"""# The segmentation network
@@ -57,7 +57,7 @@ def main():
 | `model.json` | describes the graphs; what the program reads first |
 | `trunk.onnx`, `box.onnx`, `mask.onnx` | the three graphs, float32; tensors and every step after them: `training/README.md` |
 | `scores.json`, `training_log.jsonl` | what `evaluate.py` measured; losses during the training |
-| `golden/` | a synthetic picture, what the reference inference makes of it, COCO scoring cases: for tests |
+| `golden/` | a synthetic picture, what the reference inference makes of it, a frame of our renderer (`people.jpg`), COCO scoring cases: for tests |
 
 ## Data and licence
 The weights were trained by this project and are under Apache-2.0 like the rest of it. The backbone started from a MobileNetV2 of a
@@ -69,8 +69,11 @@ pictures). The second stage adds {rendered} frames of rooms with people drawn by
 books and cups are not labelled.
 
 ## Training
-{steps} steps, {seen} augmented pictures seen (about {seen / PICTURES:.0f} passes), on two busy CPU cores, learning rate annealed by the
-clock; the last {in_second} steps are the second stage (a quarter of its pictures rendered, the rest as before). **That is short**: the same command with more time gives a better network. The backbone up to stride 8 kept its start weights.
+{steps} steps, {seen} augmented pictures seen (about {seen / PICTURES:.0f} passes) in {len(runs)} runs on two CPU cores, learning rate annealed by the
+clock in each. The second stage, from the middle of the second run on, has a quarter of its pictures rendered; the last run
+({last_seen} pictures, a tenth of them rendered) started from the graphs that the one before had exported. It made persons on
+rendered pictures and false persons in empty rooms better, and left the held-out pictures about where they were: there, more of the
+same training no longer helps much. The backbone up to stride 8 kept its start weights.
 
 ## Scores (training/evaluate.py, OpenVINO on a CPU with bfloat16; person pixels at score >= {c['score_threshold']})
 Held-out pictures drawn by people (`val.json`, {c['images']} images):

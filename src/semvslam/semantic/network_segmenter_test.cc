@@ -208,15 +208,16 @@ TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
 }
 
 TEST_F(ShippedNetwork, OpenCvFindsTheSame) {
+  constexpr double kScore = 0.5;
   SegmenterOptions options;
   options.model = kModels.string();
   options.backend = "opencv";
-  options.score = 0.3;
+  options.score = kScore;
   auto by_opencv = make_segmenter(options, RoleTable());
-  auto by_openvino = make(1, 0.3);
+  auto by_openvino = make(1, kScore);
   ASSERT_TRUE(by_opencv) << by_opencv.error().message;
   ASSERT_TRUE(by_openvino);
-  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  const cv::Mat picture = cv::imread((kModels / "golden" / "people.jpg").string());
   const auto a = (*by_opencv)->segment(request(picture)), b = (*by_openvino)->segment(request(picture));
   ASSERT_TRUE(a) << a.error().message;
   ASSERT_TRUE(b);
