@@ -188,6 +188,8 @@ void OrbExtractor::extract(const cv::Mat& gray, const cv::Mat& mask, OrbFeatures
   for (std::size_t l = 0; l < impl_->pyramid.size(); ++l) impl_->describe_level(l, mask, out);
 }
 
+void OrbExtractor::set_budget(int features) { impl_->options.features = std::max(features, 0); }
+
 const std::vector<cv::Mat>& OrbExtractor::pyramid() const { return impl_->pyramid; }
 const OrbOptions& OrbExtractor::options() const { return impl_->options; }
 

@@ -37,6 +37,9 @@ class OrbExtractor {
   /// @param out overwritten.
   void extract(const cv::Mat& gray, const cv::Mat& mask, OrbFeatures& out);
 
+  /// From the next image on so many features are aimed at, instead of OrbOptions::features. Negative: none.
+  void set_budget(int features);
+
   /// The pyramid of the last image: level 0 is the image itself. Valid until the next extract().
   const std::vector<cv::Mat>& pyramid() const;
   const OrbOptions& options() const;

@@ -16,6 +16,7 @@ double ms_since(Clock::time_point start) {
 }
 
 constexpr double kNearestProjection = 0.05;             // metres before the camera
+constexpr double kLeastUsedShare = 0.5;                 // of the features: no more than twice as many are extracted
 constexpr double kMapJumpM = 0.01, kMapJumpRad = 0.01;  // more than a local bundle adjustment moves the newest frame
 
 }  // namespace
@@ -29,7 +30,11 @@ void Tracker::Candidates::clear() {
 
 Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, const DynamicOptions& dynamic,
                  std::shared_ptr<const ObservationModel> model)
-    : options_(options), model_(std::move(model)), extractor_(orb), filter_(model_->camera(), dynamic) {}
+    : options_(options),
+      model_(std::move(model)),
+      extractor_(orb),
+      orb_features_(orb.features),
+      filter_(model_->camera(), dynamic) {}
 
 Tracker::Output Tracker::step(const RgbdFrame& frame, const Segmentation* segmentation,
                               std::shared_ptr<const LocalMap> local, bool may_request) {
@@ -73,10 +78,17 @@ void Tracker::observe(const RgbdFrame& frame, const Segmentation* segmentation, 
   const std::vector<std::uint8_t>& use = filter_.judge(pixels_, features.depth_m);
   for (std::size_t i = 0; i < use.size(); ++i)
     if (use[i] == kKnownLandmarkOnly) features.depth_m[i] = 0;  // landmarks and temporary points begin with a depth
+  share_features(static_cast<std::size_t>(std::count(use.begin(), use.end(), kFullyUsed)), use.size());
   keep_features(use, model_->camera(), features);
   current_.landmarks.assign(features.size(), LandmarkId());
   is_tracked_.assign(features.size(), 0);
   times.dynamic_ms += take_lap();
+}
+
+void Tracker::share_features(std::size_t used, std::size_t extracted) {
+  // What moves and is in no mask takes features that the static scene lacks; the next image gets as many more.
+  const double share = extracted == 0 ? 1 : static_cast<double>(used) / static_cast<double>(extracted);
+  extractor_.set_budget(static_cast<int>(std::lround(orb_features_ / std::max(share, kLeastUsedShare))));
 }
 
 void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output) {

@@ -85,6 +85,8 @@ class Tracker {
 
   /// Features of the static scene, by everything that the filter knows.
   void observe(const RgbdFrame& frame, const Segmentation* segmentation, TrackingTimes& times);
+  /// Sets how many features the next image should give, from how many of this one's may be used.
+  void share_features(std::size_t used, std::size_t extracted);
   void initialise(const RgbdFrame& frame, Output& output);
   void estimate(const RgbdFrame& frame, bool may_request, Output& output);
   /// Moves the previous frame with its reference key frame when mapping has adjusted that, and follows fused landmarks.
@@ -101,6 +103,7 @@ class Tracker {
   TrackingOptions options_;
   std::shared_ptr<const ObservationModel> model_;
   OrbExtractor extractor_;
+  int orb_features_;  // wanted on the static scene
   DynamicFilter filter_;
   std::shared_ptr<const LocalMap> local_;
   Tracked current_, last_;
