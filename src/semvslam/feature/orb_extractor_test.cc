@@ -39,6 +39,17 @@ TEST(OrbExtractor, GivesAsManyFeaturesAsWereAskedFor) {
   }
 }
 
+TEST(OrbExtractor, ANewBudgetHoldsFromTheNextImageOn) {
+  const cv::Mat image = with_noise(rectangles_image(640, 480), 2, 1);
+  OrbExtractor extractor({});
+  OrbFeatures features;
+  for (const int wanted : {1500, 200, 0}) {
+    extractor.set_budget(wanted);
+    extractor.extract(image, {}, features);
+    EXPECT_EQ(static_cast<int>(features.size()), wanted);
+  }
+}
+
 TEST(OrbExtractor, EveryLevelGetsItsShareAndAllFieldsAreInRange) {
   const OrbFeatures features = extract(with_noise(rectangles_image(640, 480), 2, 1));
   std::vector<int> count(8);
