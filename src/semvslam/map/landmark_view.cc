@@ -8,6 +8,17 @@ constexpr float kDistanceSlack = 1.2f;  // the pyramid's limits are no sharp one
 
 }  // namespace
 
+ProjectedQuery query_of(const ObservationModel& model, const LandmarkView& view, double radius_px,
+                        const Descriptor& descriptor) {
+  return {static_cast<float>(view.pixel.x()),
+          static_cast<float>(view.pixel.y()),
+          static_cast<float>(radius_px) * model.level_scale(view.level),
+          view.level - 1,
+          view.level + 1,
+          descriptor,
+          -1.f};
+}
+
 std::optional<LandmarkView> LandmarkViewer::view(const LandmarkShape& landmark) const {
   LandmarkView view;
   view.in_camera = camera_from_world_ * landmark.position;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <optional>
 
+#include "semvslam/feature/matching.h"
 #include "semvslam/geometry/se3.h"
 #include "semvslam/map/frame_features.h"
 
@@ -22,6 +23,11 @@ struct LandmarkShape {
   const Eigen::Vector3f& normal;
   float min_distance_m = 0, max_distance_m = 0;
 };
+
+/// Where and on which pyramid levels to search a landmark's descriptor. @param radius_px at level 0; grows with the
+/// level.
+ProjectedQuery query_of(const ObservationModel& model, const LandmarkView& view, double radius_px,
+                        const Descriptor& descriptor);
 
 /// A camera that landmarks are looked at from.
 class LandmarkViewer {

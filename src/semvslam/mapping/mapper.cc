@@ -149,9 +149,7 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
     const std::optional<LandmarkView> view =
         viewer.view({landmark->position, landmark->normal, landmark->min_distance_m, landmark->max_distance_m});
     if (!view) continue;
-    const float radius = static_cast<float>(options_.fuse_radius_px) * model.level_scale(view->level);
-    queries_.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
-                        view->level - 1, view->level + 1, landmark->descriptor, -1.f});
+    queries_.push_back(query_of(model, *view, options_.fuse_radius_px, landmark->descriptor));
     sources.push_back(id);
     in_camera.push_back(view->in_camera);
   }

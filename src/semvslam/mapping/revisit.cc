@@ -112,9 +112,7 @@ std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const Revisit
     const std::optional<LandmarkView> view =
         viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
     if (!view) continue;
-    const float radius = static_cast<float>(options.radius_px) * map.model().level_scale(view->level);
-    queries.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
-                       view->level - 1, view->level + 1, landmark.descriptor, -1.f});
+    queries.push_back(query_of(map.model(), *view, options.radius_px, landmark.descriptor));
     sources.push_back(l);
   }
   if (queries.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;

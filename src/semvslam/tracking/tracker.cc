@@ -266,9 +266,7 @@ int Tracker::track_local_map(const RgbdFrame& frame) {
       ++uses_[point.id].seen_through;
     else if (surface != SurfaceCheck::kHidden)
       visible.push_back(point.id);
-    const float radius = static_cast<float>(options_.local_map_radius_px) * model_->level_scale(view->level);
-    queries_.push_back({static_cast<float>(view->pixel.x()), static_cast<float>(view->pixel.y()), radius,
-                        view->level - 1, view->level + 1, point.descriptor, -1.f});
+    queries_.push_back(query_of(*model_, *view, options_.local_map_radius_px, point.descriptor));
     query_source_.push_back(static_cast<int>(k));
   }
   match_projected(queries_, current_.features->orb, current_.features->grid,
