@@ -4,19 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "semvslam/feature/orb_extractor.h"
+#include "semvslam/map/vga_testing.h"
 
 namespace semvslam {
 namespace {
-
-Camera vga() {
-  Camera c;
-  c.width_px = 640;
-  c.height_px = 480;
-  c.fx_px = c.fy_px = 500;
-  c.cx_px = 320;
-  c.cy_px = 240;
-  return c;
-}
 
 class MapTest : public testing::Test {
  protected:

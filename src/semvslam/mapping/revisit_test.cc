@@ -7,19 +7,10 @@
 #include <random>
 
 #include "semvslam/feature/orb_extractor.h"
+#include "semvslam/map/vga_testing.h"
 
 namespace semvslam {
 namespace {
-
-Camera vga() {
-  Camera c;
-  c.width_px = 640;
-  c.height_px = 480;
-  c.fx_px = c.fy_px = 500;
-  c.cx_px = 320;
-  c.cy_px = 240;
-  return c;
-}
 
 /// A camera that turns once around in a round room, and a little farther. Its map drifts: each key frame knows the
 /// landmarks that the one before it saw, with poses that are off by a little more every time.

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "semvslam/geometry/mask_lookup.h"
+
 namespace semvslam {
 namespace {
 
@@ -80,13 +82,6 @@ float median_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) 
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count / 2),
                    values.begin() + static_cast<std::ptrdiff_t>(count));
   return values[count / 2];
-}
-
-bool inside_mask(const cv::Mat& mask, const Eigen::Vector2f& pixel) {
-  if (mask.empty()) return false;
-  const int x = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, mask.cols - 1);
-  const int y = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, mask.rows - 1);
-  return mask.at<std::uint8_t>(y, x) != 0;
 }
 
 void require(bool holds, const char* what) {
@@ -225,7 +220,7 @@ TrackSample FlowTracks::make_sample(const MotionFrame& frame, const Eigen::Vecto
   sample.time_s = frame.time_s;
   sample.pixel = pixel;
   sample.ideal = camera_.undistort(pixel.cast<double>()).cast<float>();
-  sample.excluded = inside_mask(frame.excluded, pixel);
+  sample.excluded = is_masked(frame.excluded, {pixel.x(), pixel.y()});
   const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
   const cv::Vec3f texture = mean_texture(pyramid_, {x, y}, kTextureRadiusPx);
   sample.texture = {texture[0], texture[1], texture[2]};
@@ -262,7 +257,7 @@ void FlowTracks::refill(const MotionFrame& frame) {
     if (!(p.x >= border && p.y >= border && p.x < static_cast<float>(camera_.width_px) - border &&
           p.y < static_cast<float>(camera_.height_px) - border))
       return;
-    if (count[cell_of(p)] >= per_cell || inside_mask(frame.excluded, {p.x, p.y}) || !occupied.take(p.x, p.y)) return;
+    if (count[cell_of(p)] >= per_cell || is_masked(frame.excluded, p) || !occupied.take(p.x, p.y)) return;
     ++count[cell_of(p)];
     tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
