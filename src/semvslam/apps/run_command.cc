@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kDefaultMode = "full";
 
 struct RunArguments {
-  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, truth_masks;
+  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks;
   std::vector<std::string> assignments;
   std::uint64_t max_frames = 0;
   bool deterministic = false, realtime = false, quiet = false;
@@ -68,6 +68,7 @@ Result<int> run(const RunArguments& a) {
   options.out = a.out;
   options.quiet = a.quiet;
   options.debug_frames = a.debug_frames;
+  options.key_frame_masks = a.key_frame_masks;
   if (!a.truth_masks.empty())
     options.truth_masks = std::filesystem::exists(a.truth_masks) ? std::filesystem::path(a.truth_masks)
                                                                  : std::filesystem::path(a.sequence) / a.truth_masks;
@@ -94,6 +95,8 @@ CommandHandler setup_run(CLI::App& parser) {
   parser.add_option("--camera-preset", a->preset, "built-in camera, e.g. tum_fr3");
   parser.add_option("--masks", a->masks, "folder with one PNG per frame, non-zero = pixel of something that may move");
   parser.add_option("--debug-frames", a->debug_frames, "folder for a picture per frame of what was taken for moving");
+  parser.add_option("--key-frame-masks", a->key_frame_masks,
+                    "folder for a PNG per key frame, 255 = pixel of something that moves; none where nothing does");
   parser.add_option("--truth-masks", a->truth_masks,
                     "folder with the true masks (PNG, as given or in the sequence): stats.json gets a part `truth`");
   parser.add_option("--max-frames", a->max_frames, "stop after this many frames")->check(CLI::PositiveNumber);

@@ -14,6 +14,7 @@
 #include "semvslam/base/process_stats.h"
 #include "semvslam/base/stage_timer.h"
 #include "semvslam/data/prefetch.h"
+#include "semvslam/data/text_scan.h"
 #include "semvslam/dynamic/dynamic_overlay.h"
 #include "semvslam/pipeline/segment_ahead.h"
 #include "semvslam/semantic/segmentation_files.h"
@@ -246,6 +247,22 @@ std::string end_text(const Status& status, int signal) {
   return "complete";
 }
 
+Status make_folder(const std::filesystem::path& folder) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (!code) return Status::success();
+  return Error{ErrorCode::kIo, fmt::format("{}: cannot make the folder ({})", folder.string(), code.message())};
+}
+
+Status write_key_frame_masks(const std::filesystem::path& folder, const std::vector<KeyFrameMask>& masks) {
+  for (const KeyFrameMask& mask : masks) {
+    if (!mask.moving.is_set_anywhere()) continue;
+    const std::string name = fmt::format("{}.png", format_seconds(mask.stamp));
+    if (Status status = write_picture(folder / name, mask.moving.mask()); !status) return status;
+  }
+  return Status::success();
+}
+
 void keep_first(Status& first, Status status) {
   if (first && !status) first = std::move(status);
 }
@@ -260,13 +277,11 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   if (!slam) return slam.error();
   (*slam)->add_sink(std::make_shared<NoticeSink>(*output));
   if (!options.debug_frames.empty()) {
-    std::error_code code;
-    std::filesystem::create_directories(options.debug_frames, code);
-    if (code)
-      return Error{ErrorCode::kIo,
-                   fmt::format("{}: cannot make the folder ({})", options.debug_frames.string(), code.message())};
+    if (const Status status = make_folder(options.debug_frames); !status) return status.error();
     (*slam)->add_sink(std::make_shared<DebugFrameSink>(options.debug_frames, *output));
   }
+  if (!options.key_frame_masks.empty())
+    if (const Status status = make_folder(options.key_frame_masks); !status) return status.error();
   std::shared_ptr<TruthMaskSink> truth;
   if (!options.truth_masks.empty()) {
     Result<std::shared_ptr<TruthMaskSink>> opened =
@@ -298,6 +313,8 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   outcome.trajectory = (*slam)->trajectory();
   keep_first(outcome.status,
              output->write_results(outcome.trajectory, (*slam)->key_frame_trajectory(), (*slam)->landmark_positions()));
+  if (!options.key_frame_masks.empty())
+    keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, (*slam)->key_frame_masks()));
   keep_first(outcome.status, output->write("stats.json", format_statistics(outcome.record, outcome.statistics)));
   if (outcome.status && outcome.signal == 0 && outcome.statistics.tracked == 0)
     outcome.status =

@@ -18,6 +18,7 @@ struct RunOptions {
   std::optional<std::uint64_t> max_frames;
   bool quiet = false;
   std::filesystem::path debug_frames;  // folder for a picture per frame of what was taken for moving; empty = none
+  std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
   std::filesystem::path truth_masks;   // folder of true masks to judge the policy by; empty = none
 };
 

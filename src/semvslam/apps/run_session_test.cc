@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 namespace semvslam {
 namespace {
@@ -23,6 +24,7 @@ class WallSource final : public FrameSource {
     int fatal_frame = -1;    // an Error that ends the stream
     int small_frame = -1;    // an image of another size
     bool dark = false;       // nothing to see at all
+    bool masked = false;     // every frame comes with a mask
   };
 
   explicit WallSource(const Plan& plan) : plan_(plan) {
@@ -48,6 +50,10 @@ class WallSource final : public FrameSource {
     frame.stamp = TimeStamp::from_seconds(index / 30.0);
     frame.gray = index == plan_.small_frame ? gray_(cv::Rect(0, 0, 100, 100)).clone() : gray_;
     frame.depth = depth_;
+    if (plan_.masked) {
+      frame.mask = cv::Mat::zeros(240, 320, CV_8UC1);
+      frame.mask(cv::Rect(0, 0, 100, 240)).setTo(255);
+    }
     return std::optional<RgbdFrame>(std::move(frame));
   }
   bool fatal() const override { return fatal_; }
@@ -121,6 +127,20 @@ TEST_F(RunSessionTest, StopsAtTheAskedNumberOfFrames) {
   const RunOutcome outcome = run({});
   EXPECT_EQ(outcome.record.read, 5u);
   EXPECT_EQ(outcome.trajectory.size(), 5u);
+}
+
+TEST_F(RunSessionTest, TheMasksOfTheKeyFramesAreWrittenOnRequest) {
+  options_.key_frame_masks = options_.out / "masks";
+  WallSource::Plan plan;
+  plan.masked = true;
+  const RunOutcome outcome = run(plan);
+  EXPECT_TRUE(outcome.status);
+  const cv::Mat first = cv::imread((options_.key_frame_masks / "0.000000000.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(first.size(), cv::Size(320, 240));
+  EXPECT_EQ(first.at<std::uint8_t>(120, 50), 255);
+  EXPECT_EQ(first.at<std::uint8_t>(120, 200), 0);
+  const auto files = std::distance(fs::directory_iterator(options_.key_frame_masks), fs::directory_iterator());
+  EXPECT_EQ(static_cast<std::uint64_t>(files), outcome.statistics.key_frames);
 }
 
 TEST_F(RunSessionTest, NothingTrackedIsAnError) {

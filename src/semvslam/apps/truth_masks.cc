@@ -24,7 +24,7 @@ class FolderTruth final : public TruthMaskSink {
     grow_mask(near_moving, outline_px_);
     ++counts_.frames;
     for (const FeatureMark& mark : result.dynamic->features) {
-      if (mark.verdict == FeatureVerdict::kMoving && result.dynamic->fail_open != FailOpen::kMotion) continue;
+      if (mark.use == kNotUsed || (mark.use == kKnownLandmarkOnly && !mark.tracked)) continue;
       counts_.kept_on_moving.count(is_masked(moving, mark.pixel));
       if (mark.tracked) counts_.tracked_on_moving.count(is_masked(moving, mark.pixel));
     }

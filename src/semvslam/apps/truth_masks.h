@@ -18,7 +18,7 @@ struct TruthCounts {
     double value() const { return all == 0 ? 0 : static_cast<double>(part) / static_cast<double>(all); }
   };
   std::uint64_t frames = 0;  // with a true mask
-  Share kept_on_moving;      // of the features that tracking may use
+  Share kept_on_moving;      // of the features that are used: a landmark may come from them or was found at them
   Share tracked_on_moving;   // of those that a landmark was found at: the ones that the pose comes from
   Share static_dropped;      // of the whole image's features on the static scene, those that tracking may not use
   /// The same of those whose surroundings are static too: a descriptor at an outline sees both sides, and the policy

@@ -3,20 +3,41 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/dynamic/instance_rest.h"
+#include "semvslam/geometry/depth_image.h"
 #include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {
 namespace {
 
-bool overlap(const cv::Rect& a, const cv::Rect& b) {
-  const int both = (a & b).area();
-  return both * 10 > 3 * (a.area() + b.area() - both);  // IoU above 0.3
+/// Where the limbs of something that moves may be.
+struct Reach {
+  cv::Rect window;
+  float depth_m = 0;
+};
+
+/// Of the instance's pixels, on a raster; 0 = none is measured.
+float median_depth_m(const Instance& instance, const cv::Mat& depth, float metres_per_unit) {
+  constexpr int kStepPx = 6;
+  const cv::Rect window = instance.window & cv::Rect(cv::Point(), depth.size());
+  if (instance.mask.empty() || window != instance.window) return 0;
+  std::vector<float> depths_m;
+  for (int y = 0; y < window.height; y += kStepPx)
+    for (int x = 0; x < window.width; x += kStepPx) {
+      if (instance.mask.at<std::uint8_t>(y, x) == 0) continue;
+      if (const float d = depth_at_m(depth, metres_per_unit, window.x + x, window.y + y); d > 0) depths_m.push_back(d);
+    }
+  if (depths_m.empty()) return 0;
+  const auto middle = depths_m.begin() + static_cast<std::ptrdiff_t>(depths_m.size() / 2);
+  std::nth_element(depths_m.begin(), middle, depths_m.end());
+  return *middle;
 }
 
 }  // namespace
 
 struct DynamicFilter::State {
-  State(const Camera& c, const DynamicOptions& o) : camera(c), options(o), size(c.width_px, c.height_px) {
+  State(const Camera& c, const DynamicOptions& o)
+      : camera(c), options(o), size(c.width_px, c.height_px), rest(o.rest_after_s) {
     if (o.needs_segmentation()) repair.emplace(c, o.restoration);
     if (o.motion) motion.emplace(c, o.motion_options);
   }
@@ -24,8 +45,11 @@ struct DynamicFilter::State {
   void use_segmentation(const Segmentation* given);
   void compose_mask();
   void add_moving_things(double time_s);
+  bool masks(std::size_t instance) const;
+  cv::Mat watched_instances(double time_s) const;
   void find_moving_instances(double time_s);
   void mark_features(std::span<const cv::Point2f> pixels);
+  void doubt_near_movers(std::span<const float> depths_m);
   void open_if_needed(std::span<const float> depths_m);
   void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
 
@@ -34,6 +58,7 @@ struct DynamicFilter::State {
   const cv::Size size;
   std::optional<SegmentationRepair> repair;
   std::optional<MotionDetector> motion;
+  InstanceRest rest;
 
   // Of the present frame.
   RgbdFrame frame;
@@ -102,14 +127,19 @@ void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool
   if (window == instance.window && !window.empty()) target(window).setTo(255, instance.mask);
 }
 
+/// Whether an instance is left out for what it is, not for what it does.
+bool DynamicFilter::State::masks(std::size_t instance) const {
+  const Instance& i = segmentation.instances[instance];
+  return instance < masked_instances && i.role == Role::kDynamic && !rest.rests(i);
+}
+
 void DynamicFilter::State::compose_mask() {
   excluded = cv::Mat();
   const bool boxes = options.masks == "boxes";
   for (std::size_t i = 0; i < masked_instances; ++i) {
-    const Instance& instance = segmentation.instances[i];
-    if (instance.role != Role::kDynamic) continue;
+    if (!masks(i)) continue;
     if (excluded.empty()) excluded = cv::Mat::zeros(size, CV_8UC1);
-    paint(excluded, instance, boxes);
+    paint(excluded, segmentation.instances[i], boxes);
   }
   if (!excluded.empty() && !boxes)
     fit_to_depth(excluded, frame.depth, static_cast<float>(1.0 / camera.depth_units_per_m), options.fit);
@@ -153,6 +183,7 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   frame.cur_from_prev = s.cur_from_prev;
   frame.corners = pixels;
   frame.excluded = s.excluded;
+  frame.watched = s.watched_instances(frame.time_s);
   s.motion_result = s.motion->step(frame);
   s.motion->judge(pixels, depths_m, s.verdicts);
   for (const TrackMotion& track : s.motion_result.check.tracks)
@@ -160,6 +191,7 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.moving_regions = static_cast<int>(s.motion_result.regions.size());
   s.add_moving_things(frame.time_s);
   s.mark_features(pixels);
+  s.doubt_near_movers(depths_m);
   s.open_if_needed(depths_m);
   return s.usable;
 }
@@ -178,11 +210,22 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   }
 }
 
+cv::Mat DynamicFilter::State::watched_instances(double time_s) const {
+  cv::Mat watched;
+  for (std::size_t i = 0; i < masked_instances; ++i) {
+    if (!masks(i) || !rest.is_worth_watching(segmentation.instances[i], time_s)) continue;
+    if (watched.empty()) watched = cv::Mat::zeros(size, CV_8UC1);
+    paint(watched, segmentation.instances[i], false);
+  }
+  return watched;
+}
+
 void DynamicFilter::State::find_moving_instances(double time_s) {
   cv::Mat labels;
   for (std::size_t i = 0; i < segmentation.instances.size(); ++i) {
     const Instance& instance = segmentation.instances[i];
-    if (instance.role != Role::kMovable || instance.mask.empty()) continue;
+    const bool asked = instance.role == Role::kMovable || (instance.role == Role::kDynamic && options.rest_after_s > 0);
+    if (!asked || instance.mask.empty()) continue;
     if (labels.empty()) labels = cv::Mat::zeros(size, CV_16UC1);
     labels(instance.window).setTo(static_cast<double>(i + 1), instance.mask);
   }
@@ -190,11 +233,19 @@ void DynamicFilter::State::find_moving_instances(double time_s) {
   if (labels.empty()) return;
   const std::vector<InstanceMotion> motions =
       count_instance_motion(motion->tracks(), motion_result.check.tracks, labels, segmentation.instances.size());
+  std::vector<std::uint8_t> rested(motions.size(), 0);
+  for (std::size_t i = 0; i < motions.size(); ++i) rested[i] = rest.rests(segmentation.instances[i]);
+  rest.update(segmentation.instances, motions, time_s);
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const Instance& instance = segmentation.instances[i];
+    if (rested[i] && !rest.rests(instance)) {  // she has just moved: her features were taken, and go
+      if (instances_mask.empty()) instances_mask = cv::Mat::zeros(size, CV_8UC1);
+      paint(instances_mask, instance, false);
+      ++record->moving_instances;
+    }
     if (instance.role != Role::kMovable) continue;
     const auto memory = std::find_if(moved.begin(), moved.end(),
-                                     [&](const MovableMemory& m) { return overlap(m.window, instance.window); });
+                                     [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
     const bool moves =
         motions[i].moving >= options.movable_points && motions[i].moving_share() >= options.movable_share;
     if (!moves && memory == moved.end()) continue;
@@ -223,6 +274,35 @@ void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
   }
 }
 
+void DynamicFilter::State::doubt_near_movers(std::span<const float> depths_m) {
+  if (options.reach_m <= 0) return;
+  std::vector<Reach> reaches;
+  const float metres_per_unit = static_cast<float>(1.0 / camera.depth_units_per_m);
+  const auto add = [&](const cv::Rect& window, float depth_m) {
+    if (depth_m <= 0) return;  // too near to be measured: how far its arms go in the picture is not known
+    const int reach_px = cvCeil(options.reach_m * camera.fx_px / depth_m);
+    reaches.push_back({cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px,
+                                window.height + 2 * reach_px),
+                       depth_m});
+  };
+  for (std::size_t i = 0; i < masked_instances; ++i)
+    if (masks(i))
+      add(segmentation.instances[i].window,
+          median_depth_m(segmentation.instances[i], frame.depth, metres_per_unit));
+  for (const MovingRegion& region : motion_result.regions) add(region.window, region.depth_m);
+  for (std::size_t i = 0; i < depths_m.size(); ++i) {
+    FeatureMark& mark = record->features[i];
+    if (mark.verdict != FeatureVerdict::kUnknown) continue;
+    const bool near = std::any_of(reaches.begin(), reaches.end(), [&](const Reach& r) {
+      return r.window.contains(cv::Point(cvRound(mark.pixel.x), cvRound(mark.pixel.y))) &&
+             (depths_m[i] <= 0 || std::abs(depths_m[i] - r.depth_m) < options.reach_m);
+    });
+    if (!near) continue;
+    mark.reason = FeatureReason::kNearMoving;
+    usable[i] = kKnownLandmarkOnly;
+  }
+}
+
 void DynamicFilter::State::open_if_needed(std::span<const float> depths_m) {
   int left = 0, dropped = 0;
   for (std::size_t i = 0; i < depths_m.size(); ++i) {
@@ -243,7 +323,8 @@ void DynamicFilter::end(const std::optional<SE3>& camera_from_world, std::span<c
   std::size_t left = 0;
   for (std::size_t i = 0; i < s.record->features.size(); ++i) {
     FeatureMark& mark = s.record->features[i];
-    if (s.usable[i] != kNotUsed && left < tracked.size()) mark.tracked = tracked[left++] != 0;
+    mark.use = static_cast<FeatureUse>(s.usable[i]);
+    if (mark.use != kNotUsed && left < tracked.size()) mark.tracked = tracked[left++] != 0;
     ++s.record->verdicts[static_cast<std::size_t>(mark.verdict)];
     ++s.record->reasons[static_cast<std::size_t>(mark.reason)];
   }

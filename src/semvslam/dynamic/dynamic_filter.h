@@ -20,10 +20,16 @@ struct DynamicOptions {
   bool motion = false;          // motion consistency
   MaskFitOptions fit;           // of the masks' outlines to the depth image
   int dilate_px = 4;            // masks grow by this: the descriptor of a corner on the outline sees both sides
+  /// An untested feature that near in space to something that moves may be a limb that the mask lacks: no landmark may
+  /// come from it. An arm or a leg is that long; 0 = off.
+  double reach_m = 0.6;
   int least_features = 60;      // with depth; with fewer the filter opens
   double movable_share = 0.4;   // of the points of an instance of a movable class that move: it is moving
   int movable_points = 4;       // that must move at least
   double movable_hold_s = 1.0;  // it counts as moving for that long after it stopped
+  /// An instance of a dynamic class none of whose parts has moved for that long counts as static until it moves; 0 =
+  /// never. For people who sit or sleep and fill the picture; needs motion consistency.
+  double rest_after_s = 0;
   RepairOptions restoration;    // of missed segmentations
   MotionOptions motion_options;
 
@@ -31,13 +37,6 @@ struct DynamicOptions {
   /// Errors of the parts' options that single values cannot show.
   Status check() const;
   bool needs_segmentation() const { return masks != "off"; }
-};
-
-/// What a feature may be used for.
-enum FeatureUse : std::uint8_t {
-  kNotUsed = 0,
-  kFullyUsed = 1,
-  kKnownLandmarkOnly = 2,  // it may be moving, but few others are left: no landmark may come from it
 };
 
 /// The one policy on what may move: puts segmentation, its restoration and motion consistency together and says of

@@ -4,6 +4,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/geometry/mask_lookup.h"
+
 namespace semvslam {
 namespace {
 
@@ -197,6 +199,64 @@ TEST(DynamicFilter, AMovableInstanceIsLeftOutOnlyWhenItMoves) {
   const auto record = move_board(still, 0, true);
   EXPECT_EQ(record->moving_instances, 0);
   EXPECT_EQ(record->count(FeatureVerdict::kMoving), 0);
+}
+
+/// Steps with a board that is a person at `x_px`. @return the verdicts on a raster of points.
+std::vector<std::uint8_t> step_person(DynamicFilter& filter, std::uint32_t i, int x_px) {
+  const std::vector<cv::Point2f> points = raster();
+  const RgbdFrame frame = make_frame(i, x_px);
+  const Segmentation seen = make_segmentation(frame.id, {make_instance(Role::kDynamic, {x_px, 70, 80, 100}, 0.9f)});
+  filter.begin(frame, &seen, i > 0 ? std::optional<SE3>(SE3()) : std::nullopt);
+  // As tracking does: only points outside what is excluded.
+  std::vector<cv::Point2f> outside;
+  for (const cv::Point2f& p : points)
+    if (!is_masked(filter.excluded(), p)) outside.push_back(p);
+  const std::vector<std::uint8_t> use = filter.judge(outside, depths_at(outside, frame.depth));
+  filter.end(SE3(), {});
+  return use;
+}
+
+TEST(DynamicFilter, APersonAtRestIsUsedAndGoesTheMomentSheMoves) {
+  DynamicOptions options = with("masks", true);
+  options.rest_after_s = 0.5;
+  DynamicFilter filter(small_camera(), options);
+  const auto masks_anything = [&] { return !filter.excluded().empty() && cv::countNonZero(filter.excluded()) > 0; };
+  std::uint32_t i = 0;
+  for (; i < 10; ++i) step_person(filter, i, 100);
+  EXPECT_TRUE(masks_anything()) << "a third of a second is not long";
+  for (; i < 30; ++i) step_person(filter, i, 100);
+  EXPECT_FALSE(masks_anything());
+  EXPECT_GT(filter.record()->count(FeatureVerdict::kStatic), 0);
+
+  // She goes; one frame's motion of 8 px at 1.5 m is far above the noise.
+  const std::vector<std::uint8_t> use = step_person(filter, i, 108);
+  const auto record = filter.record();
+  int on_her = 0, used_on_her = 0;
+  for (std::size_t k = 0; k < use.size(); ++k) {
+    if (!cv::Rect(108, 70, 80, 100).contains(record->features[k].pixel)) continue;
+    ++on_her;
+    used_on_her += use[k] != kNotUsed;
+  }
+  EXPECT_GT(on_her, 50) << "her features had been extracted";
+  EXPECT_EQ(used_on_her, 0);
+  step_person(filter, i + 1, 116);
+  EXPECT_TRUE(masks_anything());
+}
+
+TEST(DynamicFilter, AnUntestedFeatureWithinReachOfAPersonFoundsNoLandmark) {
+  DynamicFilter filter(small_camera(), with("masks", true));
+  RgbdFrame frame = make_frame(0, 100);
+  const Segmentation person = make_segmentation(frame.id, {make_instance(Role::kDynamic, {100, 70, 80, 100}, 0.9f)});
+  filter.begin(frame, &person, std::nullopt);
+  // 60 px beside her: at her depth (0.35 m away) it may be her arm; on the wall behind her it is not.
+  const std::vector<cv::Point2f> points{{240, 120}, {240, 130}, {240, 140}};
+  const std::vector<float> depths_m{1.6f, 3.0f, 0.f};
+  const std::vector<std::uint8_t> use = filter.judge(points, depths_m);
+  EXPECT_EQ(use, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kFullyUsed, kKnownLandmarkOnly}));
+  filter.end(SE3(), {});
+  EXPECT_EQ(filter.record()->features[0].reason, FeatureReason::kNearMoving);
+  EXPECT_EQ(filter.record()->features[0].use, kKnownLandmarkOnly);
+  EXPECT_EQ(filter.record()->features[1].reason, FeatureReason::kNoEvidence);
 }
 
 TEST(DynamicFilter, WithTooFewFeaturesLeftMotionIsDoubtedFirst) {

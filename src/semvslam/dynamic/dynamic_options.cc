@@ -12,12 +12,16 @@ void DynamicOptions::add_to(ConfigSchema& s) {
         "depth that is that near to a thing's belongs to it, m");
   s.add("dynamic.fit_reach_px", &fit.reach_px, {4, 1000}, "window over which the depth of a thing is averaged, px");
   s.add("dynamic.dilate_px", &dilate_px, {0, 50}, "masks grow by this, px");
+  s.add("dynamic.reach_m", &reach_m, {0, 5},
+        "no landmark comes from an untested feature that near to something that moves, m; 0 = off");
   s.add("dynamic.least_features", &least_features, {0, 20000},
         "features with depth below which the filter opens: motion first, then the weakest masks");
   s.add("dynamic.movable_share", &movable_share, {0, 1},
         "share of the points of a movable instance (chair, book, cup) that move: it is moving");
   s.add("dynamic.movable_points", &movable_points, {1, 1000}, "and so many must");
   s.add("dynamic.movable_hold_s", &movable_hold_s, {0, 60}, "it counts as moving for that long after it stopped, s");
+  s.add("dynamic.rest_after_s", &rest_after_s, {0, 3600},
+        "a person of whom nothing has moved for that long counts as static until she moves, s; 0 = never");
   restoration.add_to(s);
   motion_options.add_to(s);
 }

@@ -20,6 +20,8 @@ std::string_view to_string(FeatureReason reason) {
       return "none";
     case FeatureReason::kNoEvidence:
       return "no_evidence";
+    case FeatureReason::kNearMoving:
+      return "near_moving";
     case FeatureReason::kPointMotion:
       return "point_motion";
     case FeatureReason::kMovingRegion:

@@ -18,11 +18,12 @@ enum class FeatureVerdict : std::uint8_t { kStatic, kMoving, kUnknown };
 enum class FeatureReason : std::uint8_t {
   kNone,            // static: nothing speaks against it
   kNoEvidence,      // unknown: no test could be made
+  kNearMoving,      // unknown: no test could be made, and within reach of something that moves
   kPointMotion,     // moving: the point track beside it moves (its reason: DynamicRecord::track_reasons)
   kMovingRegion,    // moving: on a thing of no known class that moves, or did a moment ago
   kMovingInstance,  // moving: on an instance of a movable class, enough of whose points move
 };
-inline constexpr std::size_t kFeatureReasons = 5;
+inline constexpr std::size_t kFeatureReasons = 6;
 inline constexpr std::size_t kMotionReasons = static_cast<std::size_t>(MotionReason::kMemory) + 1;
 std::string_view to_string(FeatureVerdict verdict);
 std::string_view to_string(FeatureReason reason);
@@ -46,9 +47,17 @@ enum class FailOpen : std::uint8_t {
 inline constexpr std::size_t kFailOpens = 3;
 std::string_view to_string(FailOpen fail_open);
 
+/// What a feature may be used for.
+enum FeatureUse : std::uint8_t {
+  kNotUsed = 0,
+  kFullyUsed = 1,
+  kKnownLandmarkOnly = 2,  // it may be moving: no landmark may come from it
+};
+
 /// A feature as the policy saw it, for statistics and pictures.
 struct FeatureMark {
   cv::Point2f pixel;  // recorded
+  FeatureUse use = kFullyUsed;
   FeatureVerdict verdict = FeatureVerdict::kUnknown;
   FeatureReason reason = FeatureReason::kNoEvidence;
   bool tracked = false;  // a landmark was found at it and agrees with the pose

@@ -6,6 +6,7 @@
 #include "semvslam/feature/features.h"
 #include "semvslam/feature/image_grid.h"
 #include "semvslam/geometry/camera.h"
+#include "semvslam/geometry/mask_runs.h"
 #include "semvslam/solve/observation.h"
 
 namespace semvslam {
@@ -30,6 +31,7 @@ struct FrameFeatures {
   std::vector<float> x_px, y_px;  // ideal (undistorted) pixel
   std::vector<float> depth_m;     // 0 = unknown
   ImageGrid grid;                 // over x_px, y_px
+  MaskRuns moving;                // recorded pixels of what moves or may; kept for key frames only
 
   std::size_t size() const { return orb.size(); }
   bool has_depth(std::size_t i) const { return depth_m[i] > 0.f; }

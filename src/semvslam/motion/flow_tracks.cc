@@ -96,6 +96,8 @@ void check_frame(const MotionFrame& frame, const Camera& camera) {
           "depth must be CV_16UC1 or CV_32FC1 of the camera's size");
   require(frame.excluded.empty() || (frame.excluded.size() == size && frame.excluded.type() == CV_8UC1),
           "excluded must be CV_8UC1 of the camera's size");
+  require(frame.watched.empty() || (frame.watched.size() == size && frame.watched.type() == CV_8UC1),
+          "watched must be CV_8UC1 of the camera's size");
   require(frame.instances.empty() || (frame.instances.size() == size && frame.instances.type() == CV_16UC1),
           "instances must be CV_16UC1 of the camera's size");
 }
@@ -257,20 +259,22 @@ void FlowTracks::refill(const MotionFrame& frame) {
     if (!(p.x >= border && p.y >= border && p.x < static_cast<float>(camera_.width_px) - border &&
           p.y < static_cast<float>(camera_.height_px) - border))
       return;
-    if (count[cell_of(p)] >= per_cell || is_masked(frame.excluded, p) || !occupied.take(p.x, p.y)) return;
+    if (is_masked(frame.excluded, p) && !is_masked(frame.watched, p)) return;
+    if (count[cell_of(p)] >= per_cell || !occupied.take(p.x, p.y)) return;
     ++count[cell_of(p)];
     tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
   };
-  if (!frame.corners.empty()) {
-    for (const cv::Point2f& p : frame.corners) offer(p);
-    return;
-  }
+  // The caller's corners leave out what is excluded; what is watched of it comes first, the rest is always enough.
+  const bool search_all = frame.corners.empty();
   std::vector<cv::KeyPoint> corners;
   cv::Mat strength;
-  for (int row = 0; row < rows; ++row)
+  for (int row = 0; row < rows && (search_all || !frame.watched.empty()); ++row)
     for (int column = 0; column < columns; ++column) {
       if (count[static_cast<std::size_t>(row * columns + column)] >= per_cell) continue;
+      const cv::Point2f middle((static_cast<float>(column) + 0.5f) * static_cast<float>(cell),
+                               (static_cast<float>(row) + 0.5f) * static_cast<float>(cell));
+      if (!search_all && !is_masked(frame.watched, middle)) continue;
       // FAST looks three pixels around a corner.
       const cv::Rect window =
           cv::Rect(column * cell - 3, row * cell - 3, cell + 6, cell + 6) & cv::Rect({0, 0}, frame.gray.size());
@@ -286,6 +290,7 @@ void FlowTracks::refill(const MotionFrame& frame) {
       for (const cv::KeyPoint& corner : corners)
         if (corner.response > 0.1f * corners.front().response) offer(corner.pt + cv::Point2f(window.tl()));
     }
+  for (const cv::Point2f& p : frame.corners) offer(p);
 }
 
 }  // namespace semvslam

@@ -80,6 +80,13 @@ TEST_F(DynamicSlamTest, EveryFrameIsTrackedWithItsOwnMask) {
   EXPECT_EQ(slam->statistics().dynamic.mask_sources[static_cast<std::size_t>(MaskSource::kSegmented)],
             static_cast<std::uint64_t>(kFrames));
   EXPECT_TRUE(notices->lines.empty());
+  const std::vector<KeyFrameMask> masks = slam->key_frame_masks();
+  ASSERT_EQ(masks.size(), slam->key_frame_trajectory().size());
+  for (const KeyFrameMask& mask : masks) {
+    const float x_px = 60.f + static_cast<float>(mask.frame.value) + 30.f;
+    EXPECT_TRUE(mask.moving.contains({x_px, 120.f})) << "the key frame keeps its mask";
+    EXPECT_FALSE(mask.moving.contains({x_px + 60.f, 120.f}));
+  }
 }
 
 TEST_F(DynamicSlamTest, ASegmenterThatFailsInMidRunIsReplacedByMotionAndSaidOnce) {

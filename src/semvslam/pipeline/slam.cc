@@ -297,6 +297,14 @@ Trajectory Slam::key_frame_trajectory() const {
   return trajectory;
 }
 
+std::vector<KeyFrameMask> Slam::key_frame_masks() const {
+  std::lock_guard lock(impl_->map_mutex);
+  std::vector<KeyFrameMask> masks;
+  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames())
+    masks.push_back({key_frame.frame, key_frame.stamp, key_frame.features->moving});
+  return masks;
+}
+
 std::vector<Eigen::Vector3d> Slam::landmark_positions() const {
   std::lock_guard lock(impl_->map_mutex);
   std::vector<Eigen::Vector3d> positions;

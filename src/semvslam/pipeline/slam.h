@@ -14,6 +14,7 @@
 #include "semvslam/data/frame.h"
 #include "semvslam/dynamic/dynamic_record.h"
 #include "semvslam/geometry/camera.h"
+#include "semvslam/geometry/mask_runs.h"
 #include "semvslam/geometry/se3.h"
 #include "semvslam/pipeline/config.h"
 #include "semvslam/semantic/segmentation.h"
@@ -59,6 +60,13 @@ struct SlamStatistics {
   std::vector<StageSummary> stages;
 };
 
+/// A key frame and what moved in it.
+struct KeyFrameMask {
+  FrameId frame;
+  TimeStamp stamp;
+  MaskRuns moving;  // recorded pixels of what moves or may; set nowhere if nothing does
+};
+
 /// Receives what happens; called on the thread of process().
 class Sink {
  public:
@@ -93,6 +101,8 @@ class Slam {
   /// Poses (world_from_camera) of all tracked frames with everything that mapping has learnt since, by time.
   Trajectory trajectory() const;
   Trajectory key_frame_trajectory() const;
+  /// What moved in each key frame, in the order of key_frame_trajectory(): its other pixels are the static scene's.
+  std::vector<KeyFrameMask> key_frame_masks() const;
   /// Positions of all landmarks, world frame, metres.
   std::vector<Eigen::Vector3d> landmark_positions() const;
   SlamStatistics statistics() const;

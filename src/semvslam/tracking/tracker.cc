@@ -335,6 +335,7 @@ KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
   KeyFrameRequest request;
   request.frame = frame.id;
   request.stamp = frame.stamp;
+  current_.features->moving = MaskRuns(filter_.record()->moving);
   request.features = current_.features;
   request.landmarks = current_.landmarks;
   if (last_relative_) {

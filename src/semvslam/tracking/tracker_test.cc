@@ -123,6 +123,9 @@ TEST_F(TrackerTest, NoFeatureIsTakenFromMaskedPixels) {
   ASSERT_TRUE(out.key_frame.has_value());
   for (const Keypoint& k : out.key_frame->features->orb.keypoints) EXPECT_GE(k.x_px, 159.f);
   EXPECT_EQ(out.dynamic->mask_source, MaskSource::kGiven);
+  const MaskRuns& moving = out.key_frame->features->moving;
+  EXPECT_TRUE(moving.contains({80, 120})) << "the key frame keeps its mask";
+  EXPECT_FALSE(moving.contains({240, 120}));
 }
 
 TEST_F(TrackerTest, LandmarksThatTheDepthLooksThroughAreReported) {
