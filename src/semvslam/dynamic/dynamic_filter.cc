@@ -44,9 +44,11 @@ struct DynamicFilter::State {
 
   void use_segmentation(const Segmentation* given);
   void compose_mask();
+  void expect_movers();
+  cv::Point expected_shift_px(const MovingRegion& region) const;
   void add_moving_things(double time_s);
   bool masks(std::size_t instance) const;
-  cv::Mat watched_instances(double time_s) const;
+  cv::Mat watched_parts(double time_s) const;
   void find_moving_instances(double time_s);
   void mark_features(std::span<const cv::Point2f> pixels);
   void doubt_near_movers(std::span<const float> depths_m);
@@ -65,8 +67,12 @@ struct DynamicFilter::State {
   std::optional<SE3> cur_from_prev;
   Segmentation segmentation;
   std::size_t masked_instances = 0;  // the best so many of segmentation.instances mask; fewer when the filter opened
-  cv::Mat excluded;                  // what features are not extracted from
+  cv::Mat excluded;                  // what is left out for its class
+  bool movers_avoided = true;        // false when the filter opened
+  cv::Mat expected_movers;           // where what moved in the last frame should be now
+  cv::Mat avoided;                   // both: what features are not extracted from
   MotionResult motion_result;
+  double last_time_s = 0;  // of motion_result
   cv::Mat regions_mask, instances_mask;  // moving things of no class; moving instances of movable classes
   std::vector<std::uint8_t> usable;
   std::shared_ptr<DynamicRecord> record;
@@ -93,6 +99,8 @@ void DynamicFilter::begin(const RgbdFrame& frame, const Segmentation* segmentati
   s.segmentation = {};
   if (s.repair) s.use_segmentation(segmentation);
   s.masked_instances = s.segmentation.instances.size();
+  s.movers_avoided = true;
+  s.expect_movers();
   s.compose_mask();
 }
 
@@ -152,15 +160,60 @@ void DynamicFilter::State::compose_mask() {
   }
   if (!excluded.empty()) grow_mask(excluded, options.dilate_px);
   record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
+  avoided = excluded;
+  if (expected_movers.empty() || !movers_avoided) return;
+  if (excluded.empty())
+    avoided = expected_movers;
+  else
+    cv::bitwise_or(excluded, expected_movers, avoided = cv::Mat());
 }
 
-const cv::Mat& DynamicFilter::excluded() const { return state_->excluded; }
+/// Features on what motion has found would be thrown away; the static scene shall have them. Where a mover is expected
+/// only its inside is taken for it, judge() decides on the rest.
+void DynamicFilter::State::expect_movers() {
+  constexpr int kRimPx = 4;  // how far off the expected place may be
+  expected_movers = cv::Mat();
+  if (!motion) return;
+  cv::Mat movers = cv::Mat::zeros(size, CV_8UC1);
+  const cv::Rect all(cv::Point(), size);
+  for (const MovingRegion& region : motion_result.regions) {
+    const cv::Rect shifted = region.window + expected_shift_px(region), visible = shifted & all;
+    if (!visible.empty()) movers(visible).setTo(255, region.mask(visible - shifted.tl()));
+  }
+  for (const Instance& instance : segmentation.instances)
+    if (instance.role == Role::kMovable &&
+        std::any_of(moved.begin(), moved.end(),
+                    [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); }))
+      paint(movers, instance, false);
+  cv::erode(movers, movers, cv::getStructuringElement(cv::MORPH_RECT, {2 * kRimPx + 1, 2 * kRimPx + 1}));
+  if (cv::countNonZero(movers) > 0) expected_movers = movers;
+}
+
+cv::Point DynamicFilter::State::expected_shift_px(const MovingRegion& region) const {
+  if (region.depth_m <= 0) return {};
+  const Eigen::Vector2d from(region.window.x + region.window.width / 2.0, region.window.y + region.window.height / 2.0);
+  const double elapsed_s = frame.stamp.seconds() - last_time_s;
+  Eigen::Vector3d point = camera.back_project(camera.undistort(from), region.depth_m);
+  if (region.state == RegionState::kMoving) point += region.velocity_m_s.cast<double>() * elapsed_s;
+  if (cur_from_prev) point = *cur_from_prev * point;
+  if (point.z() <= 0.05) return {};
+  const Eigen::Vector2d shift = camera.distort(camera.project(point)) - from;
+  return shift.norm() < size.width ? cv::Point(cvRound(shift.x()), cvRound(shift.y())) : cv::Point();
+}
+
+const cv::Mat& DynamicFilter::excluded() const { return state_->avoided; }
 
 bool DynamicFilter::relax(int features_with_depth) {
   State& s = *state_;
-  if (features_with_depth >= s.options.least_features || s.masked_instances == 0) return false;
-  s.masked_instances /= 2;  // instances stand best first
-  s.record->fail_open = FailOpen::kSemantic;
+  if (features_with_depth >= s.options.least_features) return false;
+  if (s.movers_avoided && !s.expected_movers.empty()) {
+    s.movers_avoided = false;  // what is found there is judged one by one
+  } else if (s.masked_instances > 0) {
+    s.masked_instances /= 2;  // instances stand best first
+    s.record->fail_open = FailOpen::kSemantic;
+  } else {
+    return false;
+  }
   s.compose_mask();
   return true;
 }
@@ -183,8 +236,9 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   frame.cur_from_prev = s.cur_from_prev;
   frame.corners = pixels;
   frame.excluded = s.excluded;
-  frame.watched = s.watched_instances(frame.time_s);
+  frame.watched = s.watched_parts(frame.time_s);
   s.motion_result = s.motion->step(frame);
+  s.last_time_s = frame.time_s;
   s.motion->judge(pixels, depths_m, s.verdicts);
   for (const TrackMotion& track : s.motion_result.check.tracks)
     ++record.track_reasons[static_cast<std::size_t>(track.reason)];
@@ -210,8 +264,8 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   }
 }
 
-cv::Mat DynamicFilter::State::watched_instances(double time_s) const {
-  cv::Mat watched;
+cv::Mat DynamicFilter::State::watched_parts(double time_s) const {
+  cv::Mat watched = movers_avoided ? expected_movers.clone() : cv::Mat();
   for (std::size_t i = 0; i < masked_instances; ++i) {
     if (!masks(i) || !rest.is_worth_watching(segmentation.instances[i], time_s)) continue;
     if (watched.empty()) watched = cv::Mat::zeros(size, CV_8UC1);

@@ -51,10 +51,11 @@ class DynamicFilter {
   /// @param segmentation of this frame, or a late one (its `frame` says of which); null = none.
   /// @param cur_from_prev expected motion of the camera since the last frame.
   void begin(const RgbdFrame& frame, const Segmentation* segmentation, const std::optional<SE3>& cur_from_prev);
-  /// CV_8UC1, non-zero where no features shall be extracted; empty = everywhere.
+  /// CV_8UC1, non-zero where no features shall be extracted: masks, and where what moved in the last frame should be
+  /// now; empty = everywhere.
   const cv::Mat& excluded() const;
-  /// Opens the masks further when too few features were found outside them: the instances with the least scores go
-  /// first. @return whether excluded() has changed.
+  /// Opens what is excluded when too few features were found outside: first what moved in the last frame, then the
+  /// instances with the least scores. @return whether excluded() has changed.
   bool relax(int features_with_depth);
 
   /// Verdicts on the features found outside excluded(). @param pixels recorded. @param depths_m as many, 0 = unknown.

@@ -265,7 +265,7 @@ void FlowTracks::refill(const MotionFrame& frame) {
     tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
   };
-  // The caller's corners leave out what is excluded; what is watched of it comes first, the rest is always enough.
+  // The caller's corners may leave out what is watched: it comes first, the rest is always enough.
   const bool search_all = frame.corners.empty();
   std::vector<cv::KeyPoint> corners;
   cv::Mat strength;

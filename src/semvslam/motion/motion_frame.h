@@ -23,8 +23,8 @@ struct MotionFrame {
   std::span<const cv::Point2f> corners;  // recorded pixels to start tracks at (the caller's features), best first;
                                          // empty = corners are searched for
   cv::Mat excluded;   // CV_8UC1, non-zero = certainly moving class: no evidence about the camera; empty = none
-  cv::Mat watched;    // CV_8UC1, non-zero = part of `excluded` where tracks start all the same, to see whether it moves;
-                      // empty = none
+  cv::Mat watched;    // CV_8UC1, non-zero = tracks are started there too, whatever is excluded and wherever the corners
+                      // are, to see whether it moves; empty = none
   cv::Mat instances;  // CV_16UC1, 0 = none, n = instance n - 1 of a segmentation of this frame; empty = none
 };
 
