@@ -171,22 +171,25 @@ void DynamicFilter::State::compose_mask() {
 /// Features on what motion has found would be thrown away; the static scene shall have them. Where a mover is expected
 /// only its inside is taken for it, judge() decides on the rest.
 void DynamicFilter::State::expect_movers() {
-  constexpr int kRimPx = 4;  // how far off the expected place may be
   expected_movers = cv::Mat();
   if (!motion) return;
-  cv::Mat movers = cv::Mat::zeros(size, CV_8UC1);
-  const cv::Rect all(cv::Point(), size);
-  for (const MovingRegion& region : motion_result.regions) {
-    const cv::Rect shifted = region.window + expected_shift_px(region), visible = shifted & all;
-    if (!visible.empty()) movers(visible).setTo(255, region.mask(visible - shifted.tl()));
-  }
+  const auto add_inside = [&](const cv::Rect& window, const cv::Mat& mask) {
+    constexpr int kRimPx = 4;  // how far off the expected place may be
+    static const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {2 * kRimPx + 1, 2 * kRimPx + 1});
+    const cv::Rect visible = window & cv::Rect(cv::Point(), size);
+    if (visible.empty() || mask.size() != window.size()) return;
+    cv::Mat inside;
+    cv::erode(mask, inside, element, {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
+    if (expected_movers.empty()) expected_movers = cv::Mat::zeros(size, CV_8UC1);
+    expected_movers(visible).setTo(255, inside(visible - window.tl()));
+  };
+  for (const MovingRegion& region : motion_result.regions)
+    add_inside(region.window + expected_shift_px(region), region.mask);
   for (const Instance& instance : segmentation.instances)
     if (instance.role == Role::kMovable &&
         std::any_of(moved.begin(), moved.end(),
                     [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); }))
-      paint(movers, instance, false);
-  cv::erode(movers, movers, cv::getStructuringElement(cv::MORPH_RECT, {2 * kRimPx + 1, 2 * kRimPx + 1}));
-  if (cv::countNonZero(movers) > 0) expected_movers = movers;
+      add_inside(instance.window, instance.mask);
 }
 
 cv::Point DynamicFilter::State::expected_shift_px(const MovingRegion& region) const {
@@ -265,10 +268,12 @@ void DynamicFilter::State::add_moving_things(double time_s) {
 }
 
 cv::Mat DynamicFilter::State::watched_parts(double time_s) const {
-  cv::Mat watched = movers_avoided ? expected_movers.clone() : cv::Mat();
+  cv::Mat watched = movers_avoided ? expected_movers : cv::Mat();
+  bool own = false;  // not yet: the filter's mask may only be read
   for (std::size_t i = 0; i < masked_instances; ++i) {
     if (!masks(i) || !rest.is_worth_watching(segmentation.instances[i], time_s)) continue;
-    if (watched.empty()) watched = cv::Mat::zeros(size, CV_8UC1);
+    if (!own) watched = watched.empty() ? cv::Mat::zeros(size, CV_8UC1) : watched.clone();
+    own = true;
     paint(watched, segmentation.instances[i], false);
   }
   return watched;

@@ -267,11 +267,12 @@ void FlowTracks::refill(const MotionFrame& frame) {
   };
   // The caller's corners may leave out what is watched: it comes first, the rest is always enough.
   const bool search_all = frame.corners.empty();
+  const int wanted = search_all ? per_cell : 1;  // the search costs more than following what it finds
   std::vector<cv::KeyPoint> corners;
   cv::Mat strength;
   for (int row = 0; row < rows && (search_all || !frame.watched.empty()); ++row)
     for (int column = 0; column < columns; ++column) {
-      if (count[static_cast<std::size_t>(row * columns + column)] >= per_cell) continue;
+      if (count[static_cast<std::size_t>(row * columns + column)] >= wanted) continue;
       const cv::Point2f middle((static_cast<float>(column) + 0.5f) * static_cast<float>(cell),
                                (static_cast<float>(row) + 0.5f) * static_cast<float>(cell));
       if (!search_all && !is_masked(frame.watched, middle)) continue;
