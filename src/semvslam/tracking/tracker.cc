@@ -104,8 +104,13 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
   output.times.frame_ms = ms_since(start);
 
   const Clock::time_point local_start = Clock::now();
-  output.inliers = ok ? track_local_map(frame) : 0;
-  ok = output.inliers >= options_.min_inliers;
+  if (ok) {
+    std::swap(candidates_, frame_matches_);
+    output.inliers = track_local_map(frame);
+    // Found again after it was lost, a frame must agree with the map: what it was matched against may be long ago.
+    if (output.inliers < options_.min_inliers && has_velocity_) output.inliers = keep_frame_matches();
+    ok = output.inliers >= options_.min_inliers;
+  }
   output.times.local_map_ms = ms_since(local_start);
 
   if (ok) {
@@ -292,6 +297,19 @@ int Tracker::track_local_map(const RgbdFrame& frame) {
   }
   count_uses(visible, found);
   return inliers;
+}
+
+int Tracker::keep_frame_matches() {
+  std::vector<LandmarkId> found;
+  for (std::size_t i = 0; i < frame_matches_.features.size(); ++i) {
+    const auto feature = static_cast<std::size_t>(frame_matches_.features[i]);
+    is_tracked_[feature] = 1;
+    if (!frame_matches_.landmarks[i].valid()) continue;
+    current_.landmarks[feature] = frame_matches_.landmarks[i];
+    found.push_back(frame_matches_.landmarks[i]);
+  }
+  count_uses({}, found);
+  return static_cast<int>(frame_matches_.features.size());
 }
 
 SurfaceCheck Tracker::look_at(const RgbdFrame& frame, const LandmarkView& view) const {

@@ -94,6 +94,9 @@ class Tracker {
   bool track_motion(const SE3& predicted, double radius_factor);
   bool track_descriptors();
   int track_local_map(const RgbdFrame& frame);
+  /// Where the local map says nothing (it is hidden, or this part of the scene is not mapped yet) the previous frame
+  /// goes on being the reference: its pose stays, and a key frame will be asked for. @return the inliers.
+  int keep_frame_matches();
   SurfaceCheck look_at(const RgbdFrame& frame, const LandmarkView& view) const;
   int estimate_pose(Candidates& candidates, SE3& camera_from_world);
   bool wants_key_frame(int inliers, FrameId frame) const;
@@ -120,7 +123,7 @@ class Tracker {
   std::vector<std::uint8_t> inlier_, is_tracked_;
   std::vector<int> query_source_;
   std::vector<cv::Point2f> pixels_;
-  Candidates candidates_;
+  Candidates candidates_, frame_matches_;  // the latter: with the previous frame, where that gave the pose
 };
 
 }  // namespace semvslam

@@ -82,6 +82,25 @@ TEST_F(TrackerTest, DescriptorsAloneBridgeAJumpThatNoPredictionCovers) {
   EXPECT_LT((out.camera_from_world * truth).translation().norm(), 0.004);
 }
 
+TEST_F(TrackerTest, ThePreviousFrameBridgesWhatTheLocalMapDoesNotKnow) {
+  const auto local = start();
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
+  auto unknown = std::make_shared<LocalMap>(*local);
+  unknown->points.clear();
+  for (int i = 2; i <= 5; ++i) {
+    const Tracker::Output out = tracker.step(world.render(i), nullptr, unknown, false);
+    ASSERT_EQ(out.state, TrackingState::kTracking) << "frame " << i;
+    EXPECT_LT((out.camera_from_world * PlaneWorld::world_from_camera(i)).translation().norm(), 0.006);
+  }
+  EXPECT_TRUE(tracker.step(world.render(6), nullptr, unknown, true).key_frame.has_value());
+  RgbdFrame dark = world.render(7);
+  dark.gray.setTo(0);
+  ASSERT_EQ(tracker.step(dark, nullptr, unknown, false).state, TrackingState::kLost);
+  EXPECT_EQ(tracker.step(world.render(8), nullptr, unknown, false).state, TrackingState::kLost)
+      << "once lost, only the map tells where the camera is";
+  EXPECT_EQ(tracker.step(world.render(9), nullptr, local, false).state, TrackingState::kTracking);
+}
+
 TEST_F(TrackerTest, ThePreviousFrameFollowsItsKeyFrameWhenMappingMovesThat) {
   const auto local = start();
   ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
