@@ -173,9 +173,9 @@ void DynamicFilter::State::compose_mask() {
 void DynamicFilter::State::expect_movers() {
   expected_movers = cv::Mat();
   if (!motion) return;
+  constexpr int kRimPx = 4;  // how far off the expected place may be
+  const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {2 * kRimPx + 1, 2 * kRimPx + 1});
   const auto add_inside = [&](const cv::Rect& window, const cv::Mat& mask) {
-    constexpr int kRimPx = 4;  // how far off the expected place may be
-    static const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {2 * kRimPx + 1, 2 * kRimPx + 1});
     const cv::Rect visible = window & cv::Rect(cv::Point(), size);
     if (visible.empty() || mask.size() != window.size()) return;
     cv::Mat inside;

@@ -192,6 +192,23 @@ TEST(DynamicFilter, AMovingThingOfNoClassIsFoundByMotionAlone) {
   EXPECT_GE(record->moving_regions, 1);
 }
 
+TEST(DynamicFilter, NoFeaturesAreExtractedWhereAMoverIsExpectedUnlessTooFewAreLeft) {
+  DynamicFilter filter(small_camera(), with("off", true));
+  (void)move_board(filter, 4, false);
+  const RgbdFrame frame = make_frame(12, 60 + 12 * 4);
+  filter.begin(frame, nullptr, SE3());
+  ASSERT_FALSE(filter.excluded().empty());
+  const cv::Rect board(60 + 12 * 4, 70, 80, 100), inside(board.x + 15, board.y + 15, board.width - 30, board.height - 30);
+  EXPECT_GT(cv::countNonZero(filter.excluded()(inside)), inside.area() * 9 / 10);
+  cv::Mat elsewhere = filter.excluded().clone();
+  elsewhere(cv::Rect(board.x - 14, board.y - 14, board.width + 28, board.height + 28)).setTo(0);
+  EXPECT_EQ(cv::countNonZero(elsewhere), 0);
+  EXPECT_FALSE(filter.relax(1000));
+  EXPECT_TRUE(filter.relax(0));
+  EXPECT_TRUE(filter.excluded().empty()) << "opened: what is found there is judged point by point";
+  EXPECT_FALSE(filter.relax(0)) << "nothing is left to open";
+}
+
 TEST(DynamicFilter, AMovableInstanceIsLeftOutOnlyWhenItMoves) {
   DynamicFilter moving(small_camera(), with("masks", true));
   EXPECT_EQ(move_board(moving, 4, true)->moving_instances, 1);
