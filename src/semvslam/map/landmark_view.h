@@ -29,11 +29,14 @@ struct LandmarkShape {
 ProjectedQuery query_of(const ObservationModel& model, const LandmarkView& view, double radius_px,
                         const Descriptor& descriptor);
 
+/// Cosine of the angle to a landmark's mean direction within which it still looks as it did: 60 degrees.
+inline constexpr double kMinViewCosine = 0.5;
+
 /// A camera that landmarks are looked at from.
 class LandmarkViewer {
  public:
   /// @param min_view_cosine of the angle to the landmark's mean direction: seen from farther off it looks different.
-  LandmarkViewer(const ObservationModel& model, const SE3& camera_from_world, double min_view_cosine)
+  LandmarkViewer(const ObservationModel& model, const SE3& camera_from_world, double min_view_cosine = kMinViewCosine)
       : model_(model),
         camera_from_world_(camera_from_world),
         centre_(camera_from_world.inverse().translation()),

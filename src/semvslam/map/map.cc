@@ -189,6 +189,16 @@ std::vector<LandmarkId> Map::landmark_ids() const {
   return ids;
 }
 
+std::vector<LandmarkId> Map::landmarks_of(const std::vector<KeyFrameId>& key_frames) const {
+  std::vector<LandmarkId> ids;
+  for (const KeyFrameId key_frame : key_frames)
+    for (const LandmarkId id : key_frames_.at(key_frame).landmarks)
+      if (id.valid()) ids.push_back(id);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  return ids;
+}
+
 Status Map::check_invariants() const {
   const auto broken = [](std::string what) { return Error{ErrorCode::kInternal, "map invariant broken: " + what}; };
   std::size_t from_key_frames = 0, from_landmarks = 0;

@@ -103,6 +103,8 @@ class Map {
   std::size_t landmark_count() const { return landmarks_.size(); }
   /// Ids of all landmarks, ascending.
   std::vector<LandmarkId> landmark_ids() const;
+  /// Ids of the landmarks that any of these key frames sees, ascending.
+  std::vector<LandmarkId> landmarks_of(const std::vector<KeyFrameId>& key_frames) const;
 
   /// Everything that must hold between key frames, landmarks and observations; the message names the first broken rule.
   Status check_invariants() const;

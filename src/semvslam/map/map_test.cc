@@ -122,6 +122,16 @@ TEST_F(MapTest, CovisibleKeyFramesAreRankedBySharedLandmarks) {
   EXPECT_TRUE(map.covisible(lonely, 1).empty());
 }
 
+TEST_F(MapTest, LandmarksOfKeyFramesComeOnceAndInOrder) {
+  const KeyFrameId a = add_key_frame(0), b = add_key_frame(0.1), c = add_key_frame(0.2);
+  const LandmarkId first = map.add_landmark({0, 0, 2}, a, 5);
+  const LandmarkId second = map.add_landmark({0, 0, 2}, b, 0);
+  map.add_landmark({0, 0, 2}, c, 1);
+  map.add_observation(first, b, 3);
+  EXPECT_THAT(map.landmarks_of({b, a}), testing::ElementsAre(first, second));
+  EXPECT_TRUE(map.landmarks_of({}).empty());
+}
+
 TEST_F(MapTest, GeometryOfALandmarkFollowsFromItsObservations) {
   const KeyFrameId a = add_key_frame(-1), b = add_key_frame(1);
   const LandmarkId l = map.add_landmark({0, 0, 2}, a, 0);

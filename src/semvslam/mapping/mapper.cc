@@ -11,8 +11,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kMinViewCosine = 0.5;  // of the angle between the views that a landmark is fused from
-
 double lap_ms(Clock::time_point& start) {
   const Clock::time_point now = Clock::now();
   const double ms = std::chrono::duration<double, std::milli>(now - start).count();
@@ -122,13 +120,7 @@ void Mapper::fuse_with_neighbours(KeyFrameId id) {
   for (const LandmarkId landmark : map_.key_frame(id)->landmarks)
     if (landmark.valid()) own.push_back(landmark);
   for (const KeyFrameId partner : partners) fuse_into(own, partner);
-  std::vector<LandmarkId> theirs;
-  for (const KeyFrameId partner : partners)
-    for (const LandmarkId landmark : map_.key_frame(partner)->landmarks)
-      if (landmark.valid()) theirs.push_back(landmark);
-  std::sort(theirs.begin(), theirs.end());
-  theirs.erase(std::unique(theirs.begin(), theirs.end()), theirs.end());
-  fuse_into(theirs, id);
+  fuse_into(map_.landmarks_of(partners), id);
   for (const LandmarkId landmark : map_.key_frame(id)->landmarks)
     if (landmark.valid()) map_.refresh_landmark(landmark);
 }
@@ -138,7 +130,7 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
   const FrameFeatures& features = *key_frame.features;
   const ObservationModel& model = map_.model();
   const Camera& camera = model.camera();
-  const LandmarkViewer viewer(model, key_frame.camera_from_world, kMinViewCosine);
+  const LandmarkViewer viewer(model, key_frame.camera_from_world);
   std::unordered_set<LandmarkId> seen(key_frame.landmarks.begin(), key_frame.landmarks.end());
   std::vector<LandmarkId> sources;
   std::vector<Eigen::Vector3d> in_camera;
@@ -198,12 +190,7 @@ void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
 }
 
 void Mapper::adjust(const std::vector<KeyFrameId>& window, BaOptions options, std::stop_token stop) {
-  std::vector<LandmarkId> landmarks;
-  for (const KeyFrameId k : window)
-    for (const LandmarkId l : map_.key_frame(k)->landmarks)
-      if (l.valid()) landmarks.push_back(l);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  const std::vector<LandmarkId> landmarks = map_.landmarks_of(window);
 
   // Key frames outside the window that see its landmarks hold the window in place; those that see most are taken.
   std::map<KeyFrameId, int> outside;

@@ -11,7 +11,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kMinViewCosine = 0.5;
 constexpr int kStrongLink = 60;  // landmarks that key frames far apart in time must share to hold each other
 /// Neighbours hold each other many times over, by links to every key frame around; one link must outweigh them all.
 constexpr double kRevisitWeight = 1000;
@@ -97,18 +96,13 @@ std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const Revisit
   for (int i = 0; i < options.recent_key_frames && first_recent != map.key_frames().begin(); ++i) --first_recent;
   const std::vector<KeyFrameId> earlier = earlier_key_frames(map, id, first_recent->first, options);
   if (earlier.empty()) return std::nullopt;
-  std::vector<LandmarkId> landmarks;
-  for (const KeyFrameId k : earlier)
-    for (const LandmarkId l : map.key_frame(k)->landmarks)
-      if (l.valid() && map.landmark(l)->observations.back().key_frame < first_recent->first) landmarks.push_back(l);
-  std::sort(landmarks.begin(), landmarks.end());
-  landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
 
-  const LandmarkViewer viewer(map.model(), key_frame.camera_from_world, kMinViewCosine);
+  const LandmarkViewer viewer(map.model(), key_frame.camera_from_world);
   std::vector<ProjectedQuery> queries;
   std::vector<LandmarkId> sources;
-  for (const LandmarkId l : landmarks) {
+  for (const LandmarkId l : map.landmarks_of(earlier)) {
     const Landmark& landmark = *map.landmark(l);
+    if (landmark.observations.back().key_frame >= first_recent->first) continue;
     const std::optional<LandmarkView> view =
         viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
     if (!view) continue;

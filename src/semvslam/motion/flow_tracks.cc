@@ -163,6 +163,12 @@ void FlowTracks::step(const MotionFrame& frame) {
   refill(frame);
 }
 
+bool FlowTracks::is_inside(cv::Point2f p) const {
+  const auto border = static_cast<float>(options_.border_px);
+  return p.x >= border && p.y >= border && p.x < static_cast<float>(camera_.width_px) - border &&
+         p.y < static_cast<float>(camera_.height_px) - border;
+}
+
 cv::Point2f FlowTracks::predict(const MotionFrame& frame, const TrackSample& last) const {
   const cv::Point2f same(last.pixel.x(), last.pixel.y());
   if (!frame.cur_from_prev) return same;
@@ -179,10 +185,7 @@ cv::Point2f FlowTracks::predict(const MotionFrame& frame, const TrackSample& las
 std::variant<cv::Point2f, TrackLoss> FlowTracks::find(cv::Point2f from, cv::Point2f start) const {
   cv::Point2f to = start;
   const bool found = follow_point(previous_pyramid_, pyramid_, from, forward_, to);
-  const float border = static_cast<float>(options_.border_px);
-  if (!(to.x >= border && to.y >= border && to.x < static_cast<float>(camera_.width_px) - border &&
-        to.y < static_cast<float>(camera_.height_px) - border))
-    return TrackLoss::kBorder;
+  if (!is_inside(to)) return TrackLoss::kBorder;
   if (!found) return TrackLoss::kNotFound;
   // Back from where it was found, starting off the known answer by the correction that the way here made: a check that
   // starts at the answer could not fail.
@@ -253,12 +256,8 @@ void FlowTracks::refill(const MotionFrame& frame) {
     occupied.take(p.x, p.y);
     ++count[cell_of(p)];
   }
-  const float border = static_cast<float>(options_.border_px);
   const auto offer = [&](const cv::Point2f& p) {
-    if (static_cast<int>(tracks_.size()) >= options_.tracks) return;
-    if (!(p.x >= border && p.y >= border && p.x < static_cast<float>(camera_.width_px) - border &&
-          p.y < static_cast<float>(camera_.height_px) - border))
-      return;
+    if (static_cast<int>(tracks_.size()) >= options_.tracks || !is_inside(p)) return;
     if (is_masked(frame.excluded, p) && !is_masked(frame.watched, p)) return;
     if (count[cell_of(p)] >= per_cell || !occupied.take(p.x, p.y)) return;
     ++count[cell_of(p)];

@@ -100,6 +100,8 @@ class FlowTracks {
   void reset();
 
  private:
+  /// Far enough from the image's border to be followed.
+  bool is_inside(cv::Point2f p) const;
   cv::Point2f predict(const MotionFrame& frame, const TrackSample& last) const;
   /// Where a point went, or why it is lost. @param start where it is searched for
   std::variant<cv::Point2f, TrackLoss> find(cv::Point2f from, cv::Point2f start) const;
