@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "semvslam/base/foreign_text.h"
+
 namespace semvslam {
 namespace {
 
@@ -40,30 +42,6 @@ std::string range_to_text(const Range& range) {
   return "";
 }
 
-// One line, shortened, without control characters: a message must stay one readable line whatever the input holds.
-std::string quoted(std::string_view text) {
-  std::string out = "'";
-  for (char c : text.substr(0, 60)) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-  return out + (text.size() > 60 ? "...'" : "'");
-}
-
-// Optimal string alignment distance: insertions, deletions, substitutions, swaps of neighbours.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    now[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
-      if (swapped) now[j] = std::min(now[j], before[j - 2] + 1);
-    }
-    std::swap(before, last);
-    std::swap(last, now);
-  }
-  return last[b.size()];
-}
-
 std::string_view last_part(std::string_view key) { return key.substr(key.rfind('.') + 1); }
 
 std::string scalar_to_yaml(const std::string& text) {
@@ -76,7 +54,7 @@ void require_good_key(std::string_view key, const void* field) {
   bool good = !key.empty() && key.front() != '.' && key.back() != '.' && field != nullptr;
   for (char c : key) good = good && ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '.');
   if (!good || key.find("..") != std::string_view::npos)
-    throw std::logic_error(fmt::format("config schema: bad key {} or null field", quoted(key)));
+    throw std::logic_error(fmt::format("config schema: bad key {} or null field", in_quotes(key)));
 }
 
 // One scalar of a YAML document, with its dotted key.
@@ -148,7 +126,7 @@ void ConfigSchema::add_number(std::string key, Number* field, Range range, std::
   const auto check = [range](const std::string& text) -> Status {
     Number value = 0;
     if (!parse_number(text, &value) || !std::isfinite(static_cast<double>(value)))
-      return invalid((kWhole ? "must be an integer, got " : "must be a number, got ") + quoted(text));
+      return invalid((kWhole ? "must be an integer, got " : "must be a number, got ") + in_quotes(text));
     if (!(value >= range.low && value <= range.high))
       return invalid(fmt::format("must be in {}, got {}", range_to_text(range), value));
     return Status::success();
@@ -175,7 +153,7 @@ void ConfigSchema::add(std::string key, double* field, Range range, std::string 
 void ConfigSchema::add(std::string key, bool* field, std::string doc) {
   const auto check = [](const std::string& text) -> Status {
     bool value = false;
-    if (!parse_bool(text, &value)) return invalid("must be true or false, got " + quoted(text));
+    if (!parse_bool(text, &value)) return invalid("must be true or false, got " + in_quotes(text));
     return Status::success();
   };
   add_entry({.key = std::move(key),
@@ -193,7 +171,7 @@ void ConfigSchema::add(std::string key, std::string* field, std::vector<std::str
   const std::string listed = fmt::format("{}", fmt::join(choices, ", "));
   const auto check = [choices, listed](const std::string& text) -> Status {
     if (choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end()) return Status::success();
-    return invalid(fmt::format("must be one of {}; got {}", listed, quoted(text)));
+    return invalid(fmt::format("must be one of {}; got {}", listed, in_quotes(text)));
   };
   add_entry({.key = std::move(key),
              .type = "text",
@@ -233,20 +211,20 @@ Status ConfigSchema::load_yaml(const std::string& text, const std::string& origi
     for (const Assignment& a : flat.found) find(a.key)->assign(a.value);
     return Status::success();
   } catch (const YAML::Exception& e) {
-    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, quoted(e.msg)));
+    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, in_quotes(e.msg)));
   }
 }
 
-Status ConfigSchema::set(std::string_view assignment) {
+Status ConfigSchema::set(std::string_view assignment, std::string_view origin) {
   const auto equals = assignment.find('=');
   if (equals == std::string_view::npos)
-    return invalid(fmt::format("--set needs key=value, got {}", quoted(assignment)));
+    return invalid(fmt::format("{} needs key=value, got {}", origin, in_quotes(assignment)));
   const std::string_view key = assignment.substr(0, equals);
   const std::string value(assignment.substr(equals + 1));
   const Entry* entry = find(key);
-  if (entry == nullptr) return unknown_key(key, "--set");
+  if (entry == nullptr) return unknown_key(key, std::string(origin));
   if (const Status status = entry->check(value); !status)
-    return invalid(fmt::format("--set: {} {}", entry->key, status.error().message));
+    return invalid(fmt::format("{}: {} {}", origin, entry->key, status.error().message));
   entry->assign(value);
   return Status::success();
 }
@@ -312,7 +290,7 @@ Error ConfigSchema::unknown_key(std::string_view key, const std::string& where) 
     if (distance < best) best = distance, nearest = &entry;
   }
   const std::string hint = nearest == nullptr ? "" : fmt::format("; the nearest known one is '{}'", nearest->key);
-  return invalid(fmt::format("{}: unknown key {}{}", where, quoted(key), hint));
+  return invalid(fmt::format("{}: unknown key {}{}", where, in_quotes(key), hint));
 }
 
 }  // namespace semvslam

@@ -31,8 +31,8 @@ class ConfigSchema {
   /// Sets values from nested YAML. An unknown key, a wrong type or a value out of range is an Error that names the
   /// origin, the line, the key and, for unknown keys, the nearest known one. Nothing is changed on error.
   Status load_yaml(const std::string& text, const std::string& origin);
-  /// Sets one value from "key=value".
-  Status set(std::string_view assignment);
+  /// Sets one value from "key=value". @param origin the command's option, for messages
+  Status set(std::string_view assignment, std::string_view origin = "--set");
   /// All keys with their present values as YAML, each with its doc line as a comment.
   std::string dump_yaml() const;
   /// A Markdown table: key, type, default, range, meaning.

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <numeric>
 
+#include "semvslam/base/foreign_text.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/data/text_scan.h"
 
@@ -49,29 +49,6 @@ struct Values {
   }
 };
 
-/// Levenshtein distance.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
-
-/// Foreign text for a message: one line of at most 80 characters.
-std::string printable(std::string_view text) {
-  std::string out;
-  for (char c : text.substr(0, 80)) out += c >= ' ' && c <= '~' ? c : '?';
-  return out;
-}
-
 std::string nearest_key(const std::vector<Key>& keys, std::string_view key) {
   const auto distance = [&](const Key& k) { return edit_distance(k.name, key.substr(0, 40)); };
   return std::min_element(keys.begin(), keys.end(),
@@ -94,7 +71,7 @@ Status read_entry(const std::string& key, const YAML::Node& value, int line, con
   };
   const auto known = std::find_if(keys.begin(), keys.end(), [&](const Key& k) { return key == k.name; });
   if (known == keys.end())
-    return fail(fmt::format("unknown key '{}'; did you mean '{}'?", printable(key), nearest_key(keys, key)));
+    return fail(fmt::format("unknown key {}; did you mean '{}'?", in_quotes(key), nearest_key(keys, key)));
   for (const Key* k : seen)
     if (k->field == known->field) return fail(fmt::format("'{}' is set a second time (first as '{}')", key, k->name));
   const std::optional<double> number = value.IsScalar() ? parse_double(value.Scalar()) : std::nullopt;
@@ -151,7 +128,7 @@ Result<Camera> parse_camera(const std::string& text, const std::string& name) {
     }
   } catch (const YAML::Exception& e) {
     return Error{ErrorCode::kInvalidInput,
-                 fmt::format("{}:{}: not valid YAML: {}", name, e.mark.line + 1, printable(e.msg))};
+                 fmt::format("{}:{}: not valid YAML: {}", name, e.mark.line + 1, in_quotes(e.msg))};
   }
   for (const Key& key : keys) {
     const bool set = std::any_of(seen.begin(), seen.end(), [&](const Key* k) { return k->field == key.field; });

@@ -7,6 +7,7 @@
 #include <queue>
 #include <tuple>
 
+#include "semvslam/base/foreign_text.h"
 #include "semvslam/data/text_scan.h"
 
 namespace semvslam {
@@ -16,15 +17,8 @@ Error line_error(const std::string& name, const TextLine& line, const std::strin
   return {ErrorCode::kInvalidInput, fmt::format("{}:{}: {}", name, line.number, what)};
 }
 
-/// At most 40 characters of foreign text for a message, on one line and printable.
-std::string quoted(std::string_view text) {
-  std::string out = "'";
-  for (char c : text.substr(0, 40)) out += c >= ' ' && c <= '~' ? c : '?';
-  return out + (text.size() > 40 ? "...'" : "'");
-}
-
 std::string bad_stamp(std::string_view word) {
-  return fmt::format("{} is no time stamp (expected decimal seconds, e.g. 1305031102.175304)", quoted(word));
+  return fmt::format("{} is no time stamp (expected decimal seconds, e.g. 1305031102.175304)", in_quotes(word));
 }
 
 /// Sorts by stamp, keeps the first of equal stamps, and counts both.

@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 #include <yaml-cpp/yaml.h>
 
+#include "semvslam/base/foreign_text.h"
+
 namespace semvslam {
 
 std::string_view to_string(Role role) {
@@ -41,16 +43,16 @@ Result<RoleTable> RoleTable::from_yaml(const std::string& text, const std::strin
       else if (name == "static")
         role = Role::kStatic;
       else
-        return wrong(fmt::format("unknown role '{}'; known: dynamic, movable, static", name));
-      if (!entry.second.IsSequence()) return wrong(fmt::format("'{}' must be a list of class names", name));
+        return wrong(fmt::format("unknown role {}; known: dynamic, movable, static", in_quotes(name)));
+      if (!entry.second.IsSequence()) return wrong(fmt::format("{} must be a list of class names", in_quotes(name)));
       for (const auto& item : entry.second) {
         const auto class_name = item.as<std::string>();
         if (!table.roles_.emplace(class_name, role).second)
-          return wrong(fmt::format("class '{}' is named twice", class_name));
+          return wrong(fmt::format("class {} is named twice", in_quotes(class_name)));
       }
     }
   } catch (const YAML::Exception& e) {
-    return wrong(e.what());
+    return wrong(fmt::format("line {}: not valid: {}", e.mark.line + 1, in_quotes(e.msg)));
   }
   return table;
 }
