@@ -10,7 +10,6 @@
 #include "semvslam/apps/command.h"
 #include "semvslam/apps/render_scene.h"
 #include "semvslam/apps/run_session.h"
-#include "semvslam/data/sequence.h"
 
 namespace semvslam {
 namespace fs = std::filesystem;
@@ -35,16 +34,11 @@ fs::path cache_folder(const fs::path& fallback) {
 Result<int> run_mode(const DemoArguments& a, const fs::path& sequence, const std::string& mode) {
   Config config;
   if (const Status status = config.apply_mode(mode); !status) return status.error();
-  SequenceOptions sequence_options;
-  sequence_options.want_colour = config.needs_segmentation();
-  Result<std::unique_ptr<FrameSource>> source = open_sequence(sequence, sequence_options);
-  if (!source) return source.error();
   RunOptions options;
   options.out = fs::path(a.out) / mode;
   options.quiet = a.quiet;
-  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
-  if (!outcome) return outcome.error();
-  return conclude_run(*outcome, sequence, options.out);
+  options.before = ProcessTime::now();
+  return run_recording(sequence, {}, config, options);
 }
 
 Result<int> demo(const DemoArguments& a) {
@@ -53,8 +47,12 @@ Result<int> demo(const DemoArguments& a) {
   const fs::path sequence =
       cache / fmt::format("demo_{}_{}_{}_{}x{}_{}_{}", SEMVSLAM_VERSION, a.scene.people, a.scene.motion,
                           a.scene.width_px, a.scene.height_px, a.scene.frames, a.scene.seed);
+  std::error_code code;
+  fs::create_directories(a.out, code);  // now: rendering takes long enough to find out afterwards
+  if (code)
+    return Error{ErrorCode::kIo,
+                 fmt::format("{}: cannot make this folder for the results ({})", a.out, code.message())};
   if (!fs::exists(sequence)) {
-    std::error_code code;
     fs::create_directories(cache, code);
     if (code)
       return Error{ErrorCode::kIo,

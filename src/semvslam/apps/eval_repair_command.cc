@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/apps/segmenter_options.h"
 #include "semvslam/data/sequence.h"
 #include "semvslam/semantic/folder_segmenter.h"
 #include "semvslam/semantic/repair_experiment.h"
@@ -132,9 +134,9 @@ nlohmann::json as_json(const std::vector<RepairCase>& cases, const std::vector<R
 
 Result<std::unique_ptr<Segmenter>> masks_of(const EvalRepairArguments& a) {
   if (a.masks == "network") return make_segmenter(a.segmenter, RoleTable());
-  const std::filesystem::path inside = std::filesystem::path(a.sequence) / a.masks;
-  return FolderSegmenter::open(std::filesystem::is_directory(inside) ? inside : std::filesystem::path(a.masks),
-                               RoleTable());
+  const Result<std::filesystem::path> folder = find_folder(a.sequence, a.masks);
+  if (!folder) return folder.error();
+  return FolderSegmenter::open(*folder, RoleTable());
 }
 
 Result<int> run_eval_repair(EvalRepairArguments a) {
@@ -190,6 +192,7 @@ Result<int> run_eval_repair(EvalRepairArguments a) {
 }  // namespace
 
 CommandHandler setup_eval_repair(CLI::App& parser) {
+  constexpr int kMost = std::numeric_limits<int>::max();
   auto a = std::make_shared<EvalRepairArguments>();
   parser.add_option("SEQUENCE", a->sequence, "recording with true masks")->required();
   parser.add_option("--masks", a->masks, "masks to damage: a folder (also inside the recording), or `network`")
@@ -201,16 +204,16 @@ CommandHandler setup_eval_repair(CLI::App& parser) {
   parser.add_option("--kind", a->kinds, "what gets lost: frames, instances, limbs")
       ->delimiter(',')
       ->check(CLI::IsMember({"frames", "instances", "limbs"}));
-  parser.add_option("--seed", a->seed, "of the damage")->capture_default_str()->check(CLI::NonNegativeNumber);
+  parser.add_option("--seed", a->seed, "of the damage")->capture_default_str()->check(CLI::Range(0, kMost));
   parser.add_option("--run", a->run, "so many frames in a row share their fate")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
   parser.add_option("--frames", a->frames, "only the first so many frames (0 = all)")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, kMost));
   parser.add_flag("--pose", a->pose, "tell the repair the true camera motion");
   parser.add_option("--set", a->settings, "configuration value, e.g. repair.grow_px=0; repeatable");
-  parser.add_option("--model", a->segmenter.model, "folder with the network's model.json");
+  add_segmenter_options(parser, a->segmenter);
   parser.add_option("--json", a->json, "write all numbers to this file (- = standard output, alone)");
   return [a] { return run_eval_repair(*a); };
 }

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,7 +31,7 @@ Status assign_values(const RunArguments& a, const std::string& file_text, Config
   for (const std::string& assignment : a.assignments)
     if (Status status = schema.set(assignment); !status) return status;
   if (!a.mode.empty())
-    if (Status status = schema.set("mode=" + a.mode); !status) return status;
+    if (Status status = schema.set("mode=" + a.mode, "--mode"); !status) return status;
   if (a.deterministic) config.deterministic = true;
   if (a.realtime) config.realtime = true;
   return config.check();
@@ -58,24 +59,18 @@ Result<int> run(const RunArguments& a) {
   sequence_options.camera_file = a.camera;
   sequence_options.camera_preset = a.preset;
   sequence_options.mask_folder = a.masks;
-  sequence_options.want_colour = config.needs_segmentation() && config.segment.source == "network";
-  if (!a.quiet)
-    sequence_options.on_warning = [](const std::string& line) { fmt::print(stderr, "semvslam: warning: {}\n", line); };
-  Result<std::unique_ptr<FrameSource>> source = open_sequence(a.sequence, sequence_options);
-  if (!source) return source.error();
-
   RunOptions options;
   options.out = a.out;
   options.quiet = a.quiet;
   options.debug_frames = a.debug_frames;
   options.key_frame_masks = a.key_frame_masks;
-  if (!a.truth_masks.empty())
-    options.truth_masks = std::filesystem::exists(a.truth_masks) ? std::filesystem::path(a.truth_masks)
-                                                                 : std::filesystem::path(a.sequence) / a.truth_masks;
+  if (!a.truth_masks.empty()) {
+    Result<std::filesystem::path> masks = find_folder(a.sequence, a.truth_masks);
+    if (!masks) return masks.error();
+    options.truth_masks = std::move(*masks);
+  }
   if (a.max_frames > 0) options.max_frames = a.max_frames;
-  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
-  if (!outcome) return outcome.error();
-  return conclude_run(*outcome, a.sequence, options.out);
+  return run_recording(a.sequence, std::move(sequence_options), config, options);
 }
 
 }  // namespace
@@ -99,7 +94,8 @@ CommandHandler setup_run(CLI::App& parser) {
                     "folder for a PNG per key frame, 255 = pixel of something that moves; none where nothing does");
   parser.add_option("--truth-masks", a->truth_masks,
                     "folder with the true masks (PNG, as given or in the sequence): stats.json gets a part `truth`");
-  parser.add_option("--max-frames", a->max_frames, "stop after this many frames")->check(CLI::PositiveNumber);
+  parser.add_option("--max-frames", a->max_frames, "stop after this many frames")
+      ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   parser.add_flag("--deterministic", a->deterministic, "two runs give the same bytes (slower: one thread)");
   parser.add_flag("--realtime", a->realtime, "keep the pace of the stamps, drop frames that come too late");
   parser.add_flag("--quiet", a->quiet, "no progress and no warnings on the terminal");

@@ -176,7 +176,7 @@ class Session {
 RunRecord Session::record(const std::string& end) const {
   RunRecord out = record_;
   out.wall_s = seconds_since(start_);
-  out.cpu_s = process_cpu_seconds();
+  out.cpu_s = process_cpu_seconds() - options_.before.cpu_s;
   out.peak_memory_bytes = peak_memory_bytes();
   out.input = input_.summary();
   out.end = end;
@@ -296,7 +296,7 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   record.mode = config.mode;
   record.deterministic = config.deterministic;
   record.realtime = config.realtime;
-  record.start_up_s = process_age_seconds();
+  record.start_up_s = process_age_seconds() - options.before.age_s;
   output->log("info", fmt::format("semvslam {}: {}", SEMVSLAM_VERSION, record.sequence));
 
   RunOutcome outcome;

@@ -7,11 +7,19 @@
 #include <string>
 
 #include "semvslam/apps/run_statistics.h"
+#include "semvslam/base/process_stats.h"
 #include "semvslam/base/result.h"
 #include "semvslam/data/frame.h"
+#include "semvslam/data/sequence.h"
 #include "semvslam/pipeline/config.h"
 
 namespace semvslam {
+
+/// Of this process, in seconds.
+struct ProcessTime {
+  double age_s = 0, cpu_s = 0;
+  static ProcessTime now() { return {process_age_seconds(), process_cpu_seconds()}; }
+};
 
 struct RunOptions {
   std::filesystem::path out;
@@ -20,6 +28,7 @@ struct RunOptions {
   std::filesystem::path debug_frames;  // folder for a picture per frame of what was taken for moving; empty = none
   std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
   std::filesystem::path truth_masks;   // folder of true masks to judge the policy by; empty = none
+  ProcessTime before;                  // spent on something else, as the demo on rendering: not counted to the run
 };
 
 /// How a run ended; everything computed is in the output folder.
@@ -37,9 +46,11 @@ struct RunOutcome {
 /// @return an Error when nothing could be started: output folder, camera.
 Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& config, const RunOptions& options);
 
-/// Prints the summary of a run and, where `sequence` has a ground truth, its score, which is written to evaluation.json
-/// and evaluation.svg too. @return the exit code of the program, or why the run is no success.
-Result<int> conclude_run(const RunOutcome& outcome, const std::filesystem::path& sequence,
-                         const std::filesystem::path& out);
+/// Runs the system over a recording, prints the summary and, where the recording has a ground truth, the score, which
+/// is written to evaluation.json and evaluation.svg too. Of `sequence_options` the configuration decides on
+/// want_colour.
+/// @return the exit code of the program, or why the run is no success.
+Result<int> run_recording(const std::filesystem::path& sequence, SequenceOptions sequence_options, Config& config,
+                          const RunOptions& options);
 
 }  // namespace semvslam

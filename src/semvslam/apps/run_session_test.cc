@@ -143,6 +143,15 @@ TEST_F(RunSessionTest, TheMasksOfTheKeyFramesAreWrittenOnRequest) {
   EXPECT_EQ(static_cast<std::uint64_t>(files), outcome.statistics.key_frames);
 }
 
+TEST_F(RunSessionTest, TimeSpentBeforeIsNotTheRuns) {
+  while (process_cpu_seconds() < 0.05) continue;
+  options_.before = ProcessTime::now();
+  const RunOutcome outcome = run({});
+  EXPECT_GT(outcome.record.cpu_s, 0);
+  EXPECT_LE(outcome.record.cpu_s, process_cpu_seconds() - options_.before.cpu_s);
+  EXPECT_LE(outcome.record.start_up_s, process_age_seconds() - options_.before.age_s);
+}
+
 TEST_F(RunSessionTest, NothingTrackedIsAnError) {
   const RunOutcome outcome =
       run({.frames = 5, .damaged_frame = -1, .fatal_frame = -1, .small_frame = -1, .dark = true});

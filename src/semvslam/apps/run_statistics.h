@@ -17,9 +17,9 @@ struct RunRecord {
   std::uint64_t read = 0;     // frames that the source gave
   std::uint64_t skipped = 0;  // frames that could not be used, each with a line in run.log
   std::uint64_t dropped = 0;  // frames left out to keep the camera's pace (realtime)
-  double start_up_s = 0;      // from the start of the process to the first frame
+  double start_up_s = 0;      // from the start of the process, or of what belongs to the run, to the first frame
   double wall_s = 0;          // of the frames
-  double cpu_s = 0;           // of the whole process
+  double cpu_s = 0;           // of the whole process, from there on
   std::int64_t peak_memory_bytes = 0;
   StageSummary input;                // waiting for frames
   std::optional<TruthCounts> truth;  // where true masks were given

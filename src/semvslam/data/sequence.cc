@@ -154,13 +154,9 @@ class RecordedSequence final : public FrameSource {
   std::size_t index_ = 0;
 };
 
-Result<fs::path> find_mask_folder(const fs::path& folder, const std::string& mask_folder) {
-  if (mask_folder.empty()) return fs::path();
-  std::error_code error;
-  for (const fs::path& candidate : {fs::path(mask_folder), folder / mask_folder})
-    if (fs::is_directory(candidate, error)) return candidate;
-  return Error{ErrorCode::kNotFound,
-               fmt::format("{}: no such mask folder, neither here nor in {}", mask_folder, folder.string())};
+std::string left_out(std::size_t count, const char* kind, const char* other) {
+  return fmt::format("{} {} {} no {} image and {} left out", count, kind, count == 1 ? "image has" : "images have",
+                     other, count == 1 ? "is" : "are");
 }
 
 void tell_warnings(const RecordedSequence& sequence, const fs::path& folder, std::size_t masks_missing,
@@ -169,11 +165,9 @@ void tell_warnings(const RecordedSequence& sequence, const fs::path& folder, std
   const PairList& pairs = sequence.layout().pairs;
   const auto say = [&](const std::string& what) { tell(folder.string() + ": " + what); };
   for (const std::string& warning : sequence.layout().warnings) say(warning);
-  if (pairs.colour_without_depth > 0)
-    say(fmt::format("{} colour images have no depth image and are left out", pairs.colour_without_depth));
-  if (pairs.depth_without_colour > 0)
-    say(fmt::format("{} depth images have no colour image and are left out", pairs.depth_without_colour));
-  if (masks_missing > 0) say(fmt::format("{} frames have no mask", masks_missing));
+  if (pairs.colour_without_depth > 0) say(left_out(pairs.colour_without_depth, "colour", "depth"));
+  if (pairs.depth_without_colour > 0) say(left_out(pairs.depth_without_colour, "depth", "colour"));
+  if (masks_missing > 0) say(fmt::format("no mask for {} of {} frames", masks_missing, pairs.pairs.size()));
 }
 
 bool is_icl_name(const fs::path& file) { return file.filename().string().ends_with(".gt.freiburg"); }
@@ -209,13 +203,22 @@ void mirror_icl(Trajectory& trajectory) {
 
 }  // namespace
 
+Result<fs::path> find_folder(const fs::path& recording, const std::string& name) {
+  std::error_code error;
+  for (const fs::path& candidate : {fs::path(name), recording / name})
+    if (fs::is_directory(candidate, error)) return candidate;
+  return Error{ErrorCode::kNotFound,
+               fmt::format("{}: no such folder, neither here nor in {}", name, recording.string())};
+}
+
 Result<std::unique_ptr<FrameSource>> open_sequence(const fs::path& folder, const SequenceOptions& options) {
   Result<SequenceLayout> layout = detect_layout(folder, options.max_association_gap_s);
   if (!layout) return layout.error();
   const Result<NamedCamera> camera = find_camera(folder, options, layout->kind);
   if (!camera) return camera.error();
   scale_stamps(*layout, camera->camera.frame_rate_hz);
-  const Result<fs::path> masks = find_mask_folder(folder, options.mask_folder);
+  Result<fs::path> masks = fs::path();
+  if (!options.mask_folder.empty()) masks = find_folder(folder, options.mask_folder);
   if (!masks) return masks.error();
   auto sequence = std::make_unique<RecordedSequence>(folder, std::move(*layout), *camera, options.want_colour, *masks);
   if (Status s = sequence->probe(); !s) return s.error();

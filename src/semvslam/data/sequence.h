@@ -15,7 +15,7 @@ struct SequenceOptions {
   std::string camera_preset;            // name of a built-in camera; empty = look elsewhere
   bool want_colour = false;             // fill RgbdFrame::colour
   double max_association_gap_s = 0.02;  // between a colour image and its depth image
-  std::string mask_folder;  // PNG per frame, named like the colour image; empty = none. As given, or in the sequence
+  std::string mask_folder;              // PNG per frame, named like the colour image; empty = none (see find_folder)
   /// Told one line per oddity found on opening (unsorted stamps, images without a partner...). May be empty: then the
   /// counts are only in description().
   std::function<void(const std::string&)> on_warning;
@@ -29,6 +29,10 @@ struct SequenceOptions {
 /// sequence, no camera, no pair, and when neither the first, the middle nor the last frame can be read: what is wrong
 /// with the first.
 Result<std::unique_ptr<FrameSource>> open_sequence(const std::filesystem::path& folder, const SequenceOptions& options);
+
+/// A folder that belongs to a recording, such as one of masks: `name` as given, or inside the recording. Errors:
+/// neither is a folder.
+Result<std::filesystem::path> find_folder(const std::filesystem::path& recording, const std::string& name);
 
 /// The reference trajectory of a recording: `path` is a trajectory file, or a sequence folder with groundtruth.txt or,
 /// for ICL-NUIM, one *.gt.freiburg file. ICL-NUIM's (known by that name, or as groundtruth.txt of a folder in its

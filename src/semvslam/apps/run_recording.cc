@@ -24,10 +24,9 @@ Status score(const Trajectory& truth, const std::string& truth_name, const Traje
   return write_file_atomically(out / "evaluation.svg", format_svg(report));
 }
 
-}  // namespace
-
-Result<int> conclude_run(const RunOutcome& outcome, const std::filesystem::path& sequence,
-                         const std::filesystem::path& out) {
+/// Prints what came of a run. @return as run_recording.
+Result<int> conclude(const RunOutcome& outcome, const std::filesystem::path& sequence,
+                     const std::filesystem::path& out) {
   fmt::print("{}", format_summary(outcome.record, outcome.statistics));
   Status scored;
   if (const Result<Trajectory> truth = read_ground_truth(sequence); truth)
@@ -39,6 +38,20 @@ Result<int> conclude_run(const RunOutcome& outcome, const std::filesystem::path&
   if (!outcome.status) return outcome.status.error();
   if (!scored) return scored.error();
   return static_cast<int>(kExitSuccess);
+}
+
+}  // namespace
+
+Result<int> run_recording(const std::filesystem::path& sequence, SequenceOptions sequence_options, Config& config,
+                          const RunOptions& options) {
+  sequence_options.want_colour = config.needs_segmentation() && config.segment.source == "network";
+  if (!options.quiet)
+    sequence_options.on_warning = [](const std::string& line) { fmt::print(stderr, "semvslam: warning: {}\n", line); };
+  Result<std::unique_ptr<FrameSource>> source = open_sequence(sequence, sequence_options);
+  if (!source) return source.error();
+  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
+  if (!outcome) return outcome.error();
+  return conclude(*outcome, sequence, options.out);
 }
 
 }  // namespace semvslam
