@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "semvslam/data/file_io.h"
+#include "semvslam/semantic/json_fault.h"
 
 namespace semvslam {
 namespace {
@@ -21,12 +23,10 @@ CocoObject parse_object(const nlohmann::json& j) {
 
 }  // namespace
 
-Result<CocoDataset> CocoDataset::read(const std::filesystem::path& json) {
-  std::ifstream stream(json);
-  if (!stream) return Error{ErrorCode::kNotFound, fmt::format("{}: cannot be opened", json.string())};
+Result<CocoDataset> CocoDataset::parse(const std::string& text, const std::string& origin) {
   CocoDataset out;
   try {
-    const nlohmann::json root = nlohmann::json::parse(stream);
+    const nlohmann::json root = nlohmann::json::parse(text);
     std::map<std::int64_t, std::size_t> index;
     for (const nlohmann::json& i : root.at("images")) {
       index[i.at("id").get<std::int64_t>()] = out.images.size();
@@ -41,9 +41,15 @@ Result<CocoDataset> CocoDataset::read(const std::filesystem::path& json) {
       out.images[at->second].objects.push_back(parse_object(a));
     }
   } catch (const std::exception& e) {
-    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", json.string(), e.what())};
+    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", origin, json_fault(e))};
   }
   return out;
+}
+
+Result<CocoDataset> CocoDataset::read(const std::filesystem::path& json) {
+  const Result<std::string> text = read_text_file(json);
+  if (!text) return text.error();
+  return parse(*text, json.string());
 }
 
 }  // namespace semvslam

@@ -30,7 +30,9 @@ struct CocoDataset {
   std::vector<CocoImage> images;
   std::map<int, std::string> categories;
 
-  /// Errors: missing, no JSON, a key missing or of a wrong type, an annotation of an unknown image.
+  /// Errors: no JSON, a key missing or of a wrong type, an annotation of an unknown image. @param origin for messages.
+  static Result<CocoDataset> parse(const std::string& text, const std::string& origin);
+  /// Errors: missing, and as parse().
   static Result<CocoDataset> read(const std::filesystem::path& json);
 };
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 namespace semvslam {
 namespace {
@@ -14,15 +16,16 @@ struct Point {
   int x, y;
 };
 
-/// The pixels of a polygon's outline on a grid five times as fine, in order.
-std::vector<Point> fine_outline(const std::vector<double>& polygon, double scale) {
+/// Visits the pixels of a polygon's outline on a grid so many times as fine, in order. They are not stored: corners far
+/// outside make very many.
+template <typename Visit>
+void walk_outline(const std::vector<double>& polygon, double scale, const Visit& visit) {
   const std::size_t n = polygon.size() / 2;
   std::vector<Point> corners;
   for (std::size_t i = 0; i < n; ++i)
     corners.push_back(
         {static_cast<int>(scale * polygon[2 * i] + .5), static_cast<int>(scale * polygon[2 * i + 1] + .5)});
   corners.push_back(corners[0]);
-  std::vector<Point> out;
   for (std::size_t i = 0; i < n; ++i) {
     Point a = corners[i], b = corners[i + 1];
     const int dx = std::abs(b.x - a.x), dy = std::abs(b.y - a.y);
@@ -34,29 +37,27 @@ std::vector<Point> fine_outline(const std::vector<double>& polygon, double scale
                                     : static_cast<double>(b.x - a.x) / dy;
     for (int d = 0; d <= steps; ++d) {
       const int t = flip ? steps - d : d;
-      out.push_back(dx >= dy ? Point{t + a.x, static_cast<int>(a.y + slope * t + .5)}
-                             : Point{static_cast<int>(a.x + slope * t + .5), t + a.y});
+      visit(dx >= dy ? Point{t + a.x, static_cast<int>(a.y + slope * t + .5)}
+                     : Point{static_cast<int>(a.x + slope * t + .5), t + a.y});
     }
   }
-  return out;
 }
 
 /// Fills a polygon as the COCO tools do (their rleFrPoly): where the outline crosses a column of pixel centres, the
 /// state below flips. Written after their description; the same pixels matter because scores are compared.
 void fill(const std::vector<double>& polygon, cv::Mat& mask) {
   constexpr double kScale = 5;
-  const std::vector<Point> outline = fine_outline(polygon, kScale);
   std::vector<std::size_t> flips;
   const auto height = static_cast<std::size_t>(mask.rows);
-  for (std::size_t j = 1; j < outline.size(); ++j) {
-    const Point& p = outline[j];
-    const Point& q = outline[j - 1];
-    if (p.x == q.x) continue;
+  std::optional<Point> last;
+  walk_outline(polygon, kScale, [&](const Point& p) {
+    const Point q = std::exchange(last, p).value_or(p);
+    if (p.x == q.x) return;
     const double x = ((p.x < q.x ? p.x : p.x - 1) + .5) / kScale - .5;
-    if (std::floor(x) != x || x < 0 || x > mask.cols - 1) continue;
+    if (std::floor(x) != x || x < 0 || x > mask.cols - 1) return;
     const double y = std::clamp((std::min(p.y, q.y) + .5) / kScale - .5, 0., static_cast<double>(mask.rows));
     flips.push_back(static_cast<std::size_t>(x) * height + static_cast<std::size_t>(std::ceil(y)));
-  }
+  });
   std::sort(flips.begin(), flips.end());
   for (std::size_t i = 0; i + 1 < flips.size(); i += 2)
     for (std::size_t at = flips[i]; at < flips[i + 1]; ++at)

@@ -14,6 +14,7 @@
 
 #include "semvslam/data/file_io.h"
 #include "semvslam/semantic/coco_region.h"
+#include "semvslam/semantic/json_fault.h"
 
 namespace semvslam {
 namespace fs = std::filesystem;
@@ -84,7 +85,7 @@ Status FolderSegmenter::read_roles() {
       for (const nlohmann::json& role : listed)
         class_of_number_[role.at("number").get<int>()] = class_of(role.at("label").get<std::string>());
     } catch (const nlohmann::json::exception& e) {
-      return wrong_file(file, e.what());
+      return wrong_file(file, json_fault(e));
     }
     break;
   }
@@ -188,7 +189,7 @@ Status FolderSegmenter::read_json(const fs::path& file, Segmentation& out) {
       out.instances.push_back(std::move(i));
     }
   } catch (const std::exception& e) {
-    return wrong_file(file, e.what());
+    return wrong_file(file, json_fault(e));
   }
   return Status::success();
 }

@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "semvslam/data/file_io.h"
+#include "semvslam/semantic/json_fault.h"
 
 namespace semvslam {
 namespace {
@@ -62,20 +64,26 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
 
 }  // namespace
 
+Result<ModelDescription> ModelDescription::parse(const std::string& text, const std::string& origin) {
+  ModelDescription m;
+  try {
+    fill(m, nlohmann::json::parse(text));
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", origin, json_fault(e))};
+  }
+  return m;
+}
+
 Result<ModelDescription> ModelDescription::read(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "model.json";
-  std::ifstream stream(file);
-  if (!stream)
+  const Result<std::string> text = read_text_file(file);
+  if (!text)
     return Error{ErrorCode::kNotFound, fmt::format("{}: cannot be opened; a model is a folder with this file and the "
                                                    "network's graphs (training/export.py writes it)",
                                                    file.string())};
-  ModelDescription m;
-  try {
-    fill(m, nlohmann::json::parse(stream));
-  } catch (const std::exception& e) {
-    return Error{ErrorCode::kInvalidInput, fmt::format("{}: {}", file.string(), e.what())};
-  }
-  for (const std::string& name : {m.trunk, m.box, m.mask})
+  Result<ModelDescription> m = parse(*text, file.string());
+  if (!m) return m;
+  for (const std::string& name : {m->trunk, m->box, m->mask})
     if (!std::filesystem::is_regular_file(folder / name))
       return Error{ErrorCode::kNotFound,
                    fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};

@@ -35,6 +35,8 @@ struct ModelDescription {
 
   int anchors_per_cell() const { return static_cast<int>(anchor_sizes[0].size() * anchor_ratios.size()); }
 
+  /// Errors: no JSON, a key missing or out of range. @param origin for messages.
+  static Result<ModelDescription> parse(const std::string& text, const std::string& origin);
   /// Reads folder/model.json. Errors: missing, no JSON, a key missing or out of range, a file that it names missing.
   static Result<ModelDescription> read(const std::filesystem::path& folder);
 };
