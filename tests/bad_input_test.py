@@ -3,23 +3,13 @@
 computed is lost.
 usage: bad_input_test.py PROGRAM [unittest options]"""
 import json
-import pathlib
-import shutil
 import struct
-import subprocess
-import sys
-import tempfile
 import unittest
 import zlib
 
-PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
-FRAMES = 30
-WIDTH, HEIGHT = 320, 240
+from program_testing import HEIGHT, WIDTH, ProgramCase, call
 
-
-def call(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240,
-                          check=False)
+FRAMES = ProgramCase.FRAMES
 
 
 def png(width, height, bits=8):
@@ -62,23 +52,10 @@ def read_png_16(path):
     return out
 
 
-class BadInputTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="semvslam_test_"))
-        cls.whole = cls.folder / "whole"
-        done = call("render", "--out", cls.whole, "--people", "none", "--size", f"{WIDTH}x{HEIGHT}", "--frames", FRAMES, "--quiet")
-        if done.returncode != 0:
-            raise RuntimeError(f"render: {done.stderr}")
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
+class BadInputTest(ProgramCase):
     def setUp(self):
-        name = self.id().rsplit(".", 1)[-1]
-        self.sequence, self.out = self.folder / name, self.folder / (name + "_out")
-        shutil.copytree(self.whole, self.sequence)
+        super().setUp()
+        self.sequence = self.copy_of_whole()
 
     def lines(self, name):
         return [line for line in (self.sequence / name).read_text().splitlines() if not line.startswith("#")]
@@ -103,17 +80,9 @@ class BadInputTest(unittest.TestCase):
         self.assertTrue(all(a < b for a, b in zip(stamps, stamps[1:])), "stamps grow")
         return done
 
-    def error_of(self, done, code):
-        self.assertEqual(code, done.returncode, done.stderr)
-        errors = [line for line in done.stderr.splitlines() if line.startswith("semvslam: error: ")]
-        self.assertEqual(1, len(errors), done.stderr)
-        return errors[0]
-
     def refuse(self, code, *words):
         """A run that cannot be done: one line that holds these words."""
-        line = self.error_of(call("run", self.sequence, "--out", self.out), code)
-        for word in words:
-            self.assertIn(word, line)
+        self.expect_error(call("run", self.sequence, "--out", self.out), code, *words)
 
     def test_depth_that_is_missing_for_some_frames(self):
         self.image("depth", 7).unlink()  # listed, but gone
@@ -138,6 +107,11 @@ class BadInputTest(unittest.TestCase):
         self.image("rgb", 8).write_bytes(self.image("rgb", 8).read_bytes()[:2000])
         self.image("depth", 10).write_bytes(png(WIDTH, HEIGHT, 8))
         self.run_it(FRAMES - 4, 4)
+
+    def test_images_that_all_break_off(self):
+        for index in range(FRAMES):
+            self.image("depth", index).write_bytes(self.image("depth", index).read_bytes()[:500])
+        self.refuse(3, "depth", "the PNG is truncated")
 
     def test_every_image_of_another_size(self):
         for index in range(FRAMES):
@@ -174,6 +148,8 @@ class BadInputTest(unittest.TestCase):
         lines[4], lines[9] = "nan " + lines[4].split()[1], "inf " + lines[9].split()[1]
         self.write("rgb.txt", lines)
         self.run_it(FRAMES - 2, warning="rgb.txt")
+        self.write("rgb.txt", ["nan " + line.split()[1] for line in lines])
+        self.refuse(3, "rgb.txt: no image in the list: 30 time stamps not a number")
 
     def test_stamps_that_are_no_numbers(self):
         lines = self.lines("rgb.txt")
@@ -213,8 +189,7 @@ class BadInputTest(unittest.TestCase):
 
     def test_output_that_cannot_be_written(self):
         for out in ("/proc/semvslam_test", "/dev/null/results", self.sequence / "rgb.txt" / "results"):
-            line = self.error_of(call("run", self.sequence, "--out", out), 4)
-            self.assertIn(str(out), line)
+            self.expect_error(call("run", self.sequence, "--out", out), 4, str(out))
         (self.out / "stats.json").mkdir(parents=True)
         (self.out / "stats.json" / "something").write_text("x")
         self.refuse(4, "stats.json")

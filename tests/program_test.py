@@ -4,23 +4,16 @@ usage: program_test.py PROGRAM [unittest options]"""
 import filecmp
 import json
 import os
-import pathlib
 import resource
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 
-PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
+from program_testing import PROGRAM, ProgramCase, call
+
 RESULTS = {"trajectory.txt", "keyframes.txt", "map.ply", "stats.json", "config.yaml", "run.log"}
-
-
-def call(*arguments, **options):
-    return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=240, **options)
 
 
 def wait_for(condition, seconds=60):
@@ -32,33 +25,8 @@ def wait_for(condition, seconds=60):
         time.sleep(0.02)
 
 
-class ProgramTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="semvslam_test_"))
-        cls.sequence = cls.folder / "sequence"
-        done = call("render", "--out", cls.sequence, "--people", "none", "--size", "320x240", "--frames", "90", "--quiet")
-        if done.returncode != 0:
-            raise RuntimeError(f"render: {done.stderr}")
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
-
-    def setUp(self):
-        self.out = self.folder / self.id().rsplit(".", 1)[-1]
-
-    def expect_error(self, done, code, *words):
-        self.assertEqual(code, done.returncode, done.stderr)
-        errors = [line for line in done.stderr.splitlines() if line.startswith("semvslam: error: ")]
-        self.assertEqual(1, len(errors), done.stderr)
-        for word in words:
-            self.assertIn(word, errors[0])
-
-    def copy_of_sequence(self):
-        copy = self.folder / (self.out.name + "_sequence")
-        shutil.copytree(self.sequence, copy)
-        return copy
+class ProgramTest(ProgramCase):
+    FRAMES = 90
 
     def test_version_and_help(self):
         self.assertRegex(call("version").stdout, r"^semvslam \d+\.\d+\.\d+\n$")
@@ -69,20 +37,20 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(2, call().returncode)
 
     def test_wrong_command_lines(self):
-        self.expect_error(call("fly"), 2)
-        self.expect_error(call("run", self.sequence), 2, "--out")
-        self.expect_error(call("run", self.sequence, "--out", self.out, "--max-frames", "-3"), 2)
+        self.expect_error(call("runn"), 2, "unknown command 'runn'", "'run'")
+        self.expect_error(call("run", self.whole), 2, "--out")
+        self.expect_error(call("run", self.whole, "--out", self.out, "--max-frames", "-3"), 2, "--max-frames", "not in range 1 to")
 
     def test_config_is_read_back(self):
         text = call("config").stdout
         file = self.folder / "all.yaml"
         file.write_text(text)
-        done = call("run", self.sequence, "--out", self.out, "--config", file, "--max-frames", 3, "--quiet")
+        done = call("run", self.whole, "--out", self.out, "--config", file, "--max-frames", 3, "--quiet")
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertEqual(text, (self.out / "config.yaml").read_text())
 
     def test_run_writes_everything_and_is_accurate(self):
-        done = call("run", self.sequence, "--out", self.out)
+        done = call("run", self.whole, "--out", self.out)
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertLessEqual(RESULTS | {"evaluation.json", "evaluation.svg"}, set(os.listdir(self.out)))
         stats = json.loads((self.out / "stats.json").read_text())
@@ -101,27 +69,29 @@ class ProgramTest(unittest.TestCase):
 
     def test_deterministic_runs_are_equal(self):
         runs = [self.out / name for name in ("a", "b")]
-        self.assertEqual(0, call("run", self.sequence, "--out", runs[0], "--deterministic", "--quiet").returncode)
+        self.assertEqual(0, call("run", self.whole, "--out", runs[0], "--deterministic", "--quiet").returncode)
         # The second one on a single processor: the order of threads must not matter either.
         one = {min(os.sched_getaffinity(0))}
-        self.assertEqual(0, call("run", self.sequence, "--out", runs[1], "--deterministic", "--quiet",
+        self.assertEqual(0, call("run", self.whole, "--out", runs[1], "--deterministic", "--quiet",
                                  preexec_fn=lambda: os.sched_setaffinity(0, one)).returncode)
         for name in ("trajectory.txt", "keyframes.txt", "map.ply"):
             self.assertTrue(filecmp.cmp(runs[0] / name, runs[1] / name, shallow=False), name)
 
     def test_max_frames(self):
-        self.assertEqual(0, call("run", self.sequence, "--out", self.out, "--max-frames", 7, "--quiet").returncode)
+        self.assertEqual(0, call("run", self.whole, "--out", self.out, "--max-frames", 7, "--quiet").returncode)
         self.assertEqual(7, json.loads((self.out / "stats.json").read_text())["frames"])
 
     def test_configuration_errors(self):
-        run = ("run", self.sequence, "--out", self.out)
+        run = ("run", self.whole, "--out", self.out)
         self.expect_error(call(*run, "--set", "orb.featurs=5"), 3, "unknown key 'orb.featurs'", "orb.features")
         self.expect_error(call(*run, "--set", "orb.features=many"), 3, "integer")
         file = self.folder / "bad.yaml"
         file.write_text("orb:\n  features: -1\n")
         self.expect_error(call(*run, "--config", file), 3, "bad.yaml:2", "orb.features")
         self.expect_error(call(*run, "--config", self.folder / "none.yaml"), 3, "none.yaml")
-        self.expect_error(call(*run, "--mode", "magic"), 3, "mode")
+        self.expect_error(call(*run, "--mode", "magic"), 3, "--mode: mode must be one of orb,", "'magic'")
+        self.expect_error(call(*run, "--masks", "nowhere"), 3, "nowhere: no such folder")
+        self.expect_error(call(*run, "--truth-masks", "nowhere"), 3, "nowhere: no such folder")
 
     def test_missing_and_empty_sequences(self):
         self.expect_error(call("run", self.folder / "nothing", "--out", self.out), 3, "nothing")
@@ -130,7 +100,7 @@ class ProgramTest(unittest.TestCase):
         self.expect_error(call("run", empty, "--out", self.out), 3, "empty")
 
     def test_unusable_frames_are_skipped_and_counted(self):
-        copy = self.copy_of_sequence()
+        copy = self.copy_of_whole()
         images = sorted((copy / "rgb").iterdir())
         images[20].write_bytes(images[20].read_bytes()[:1000])  # truncated
         images[30].unlink()
@@ -144,7 +114,7 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(3, (self.out / "run.log").read_text().count("skipped:"))
 
     def test_input_that_breaks_off(self):
-        copy = self.copy_of_sequence()
+        copy = self.copy_of_whole()
         text = (copy / "rgb.txt").read_text()
         (copy / "rgb.txt").write_text(text[:len(text) // 2])
         done = call("run", copy, "--out", self.out)
@@ -153,11 +123,11 @@ class ProgramTest(unittest.TestCase):
 
     def test_output_that_is_no_folder(self):
         self.out.write_text("a file")
-        self.expect_error(call("run", self.sequence, "--out", self.out), 4, self.out.name)
+        self.expect_error(call("run", self.whole, "--out", self.out), 4, self.out.name)
 
     def there_and_back(self, times):
         """The sequence forth, back, forth...: as long as one likes, with no more pictures."""
-        copy = self.copy_of_sequence()
+        copy = self.copy_of_whole()
         for name in ("rgb.txt", "depth.txt"):
             lines = [line.split() for line in (copy / name).read_text().splitlines() if not line.startswith("#")]
             files = [file for _, file in lines]
@@ -182,9 +152,22 @@ class ProgramTest(unittest.TestCase):
         for line in lines[1:]:
             self.assertEqual(8, len(line.split()), "a line that breaks off")
 
+    def test_standard_output_that_is_full(self):
+        if not os.path.exists("/dev/full"):
+            self.skipTest("this system has no /dev/full")
+        truth = self.whole / "groundtruth.txt"
+        with open("/dev/full", "w", encoding="ascii") as full:
+            self.expect_error(call("eval", truth, truth, stdout=full), 4, "standard output")
+            self.expect_error(call("config", stdout=full), 4, "standard output")
+
+    def test_demo_says_at_once_that_it_cannot_write(self):
+        caches = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")}
+        self.expect_error(call("demo", "--out", "/dev/null/results", env=caches), 4, "/dev/null/results")
+        self.assertFalse((self.folder / "cache").exists())
+
     def start_slow_run(self):
         """A run at the camera's pace, three seconds long, with its trajectory growing."""
-        process = subprocess.Popen([PROGRAM, "run", self.sequence, "--out", self.out, "--realtime"],
+        process = subprocess.Popen([PROGRAM, "run", self.whole, "--out", self.out, "--realtime"],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.stderr.close)
@@ -204,6 +187,17 @@ class ProgramTest(unittest.TestCase):
             self.assertGreater(stats["tracked"], 3)
             shutil.rmtree(self.out)
 
+    def test_interrupted_rendering_leaves_nothing_half_done(self):
+        process = subprocess.Popen([PROGRAM, "render", "--out", self.out, "--frames", "10000", "--size", "64x48"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        unfinished = self.out.with_name(self.out.name + ".part") / "rgb"
+        wait_for(lambda: unfinished.exists() and any(unfinished.iterdir()))
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(128 + signal.SIGINT, process.returncode)
+        self.assertIn("semvslam: error: interrupted after ", errors)
+        self.assertFalse(self.out.exists() or unfinished.parent.exists())
+
     def test_kill_leaves_what_was_tracked(self):
         process = self.start_slow_run()
         wait_for(lambda: (self.out / "stats.json").exists())
@@ -215,7 +209,7 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual("running", json.loads((self.out / "stats.json").read_text())["end"])
 
     def test_eval_bad_input(self):
-        truth = self.sequence / "groundtruth.txt"
+        truth = self.whole / "groundtruth.txt"
         lines = truth.read_text().splitlines()
 
         def file(name, content):
@@ -224,7 +218,7 @@ class ProgramTest(unittest.TestCase):
             return path
 
         self.expect_error(call("eval", truth, self.folder / "none.txt"), 3, "none.txt")
-        self.expect_error(call("eval", file("one.txt", "1 0 0 0 0 0 0 1\n"), truth), 3, "1 poses")
+        self.expect_error(call("eval", file("one.txt", "1 0 0 0 0 0 0 1\n"), truth), 3, "one.txt", "1 pose;")
         self.expect_error(call("eval", file("nan.txt", "\n".join(lines[:5]) + "\n9 nan 0 0 0 0 0 1\n"), truth), 3, "nan.txt:6")
         self.expect_error(call("eval", file("zero.txt", "1 0 0 0 0 0 0 0\n"), truth), 3, "zero.txt:1")
         far = "".join(f"{1000 + i} {i} {i * i} 0 0 0 0 1\n" for i in range(5))

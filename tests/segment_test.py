@@ -4,32 +4,22 @@ usage: segment_test.py PROGRAM PICTURE [unittest options]      PICTURE: shows a 
 import json
 import pathlib
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
 
-PROGRAM, PICTURE = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
+from program_testing import ErrorLineCase, call
+
+PICTURE = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
-def call(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=240)
-
-
-class SegmentTest(unittest.TestCase):
+class SegmentTest(ErrorLineCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="semvslam_segment_"))
         self.out = self.folder / "out"
 
     def tearDown(self):
         shutil.rmtree(self.folder)
-
-    def expect_error(self, done, code, *words):
-        self.assertEqual(code, done.returncode, done.stderr)
-        errors = [line for line in done.stderr.splitlines() if line.startswith("semvslam: error: ")]  # libpng adds its own
-        self.assertEqual(1, len(errors), done.stderr)
-        for word in words:
-            self.assertIn(word, errors[0])
 
     def segmented(self):
         done = call("segment", PICTURE, "--out", self.out, "--precision", "f32")

@@ -22,12 +22,12 @@ struct EvalArguments {
 
 Error about(const std::string& file, const Error& error) { return {error.code, file + ": " + error.message}; }
 
-Result<NamedEvaluation> evaluate_file(const std::string& file, const Trajectory& reference,
-                                      const EvaluationOptions& options) {
+Result<NamedEvaluation> evaluate_file(const std::string& file, const std::string& reference_file,
+                                      const Trajectory& reference, const EvaluationOptions& options) {
   const Result<Trajectory> estimate = read_trajectory(file);
   if (!estimate) return estimate.error();
   Result<Evaluation> evaluation = evaluate(reference, *estimate, options);
-  if (!evaluation) return about(file, evaluation.error());
+  if (!evaluation) return about(file + " against " + reference_file, evaluation.error());
   return NamedEvaluation{file, std::move(*evaluation)};
 }
 
@@ -59,11 +59,11 @@ Result<int> run_eval(const EvalArguments& arguments) {
 
   const Result<Trajectory> reference = read_trajectory(arguments.reference);
   if (!reference) return reference.error();
-  Result<NamedEvaluation> estimate = evaluate_file(arguments.estimate, *reference, report.options);
+  Result<NamedEvaluation> estimate = evaluate_file(arguments.estimate, arguments.reference, *reference, report.options);
   if (!estimate) return estimate.error();
   report.estimate = std::move(*estimate);
   if (!arguments.against.empty()) {
-    Result<NamedEvaluation> against = evaluate_file(arguments.against, *reference, report.options);
+    Result<NamedEvaluation> against = evaluate_file(arguments.against, arguments.reference, *reference, report.options);
     if (!against) return against.error();
     report.against = std::move(*against);
   }

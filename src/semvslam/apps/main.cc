@@ -4,12 +4,19 @@
 #endif
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/apps/interrupt.h"
+#include "semvslam/base/foreign_text.h"
 
 namespace semvslam {
 namespace {
@@ -37,6 +44,14 @@ void keep_images_out_of_the_heap() {
 #endif
 }
 
+std::string unknown_command(std::string_view name) {
+  const auto distance = [&](const Command& c) { return edit_distance(name.substr(0, 40), c.name); };
+  const auto nearest = std::min_element(commands().begin(), commands().end(),
+                                        [&](const Command& a, const Command& b) { return distance(a) < distance(b); });
+  return fmt::format("unknown command {}; the nearest known one is '{}' (see 'semvslam help')", in_quotes(name),
+                     nearest->name);
+}
+
 int run(int argc, char** argv) {
   CLI::App program("semvslam: RGB-D SLAM for scenes with people", "semvslam");
   program.footer(kFooter);
@@ -50,6 +65,10 @@ int run(int argc, char** argv) {
   const CLI::App* help = program.add_subcommand("help", "show this help");
   const std::string help_text = program.help();  // after parsing, it would be that of the parsed sub-command
 
+  const auto is_asked_for = [&](const auto& handler) { return handler.first->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && argv[1] != help->get_name() &&
+      std::none_of(handlers.begin(), handlers.end(), is_asked_for))
+    return fail(kExitUsage, unknown_command(argv[1]));
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help, --version
@@ -60,7 +79,9 @@ int run(int argc, char** argv) {
   for (const auto& [parser, handler] : handlers) {
     if (!parser->parsed()) continue;
     const Result<int> result = handler();
-    return result ? *result : fail(exit_code_of(result.error().code), result.error().message);
+    if (result) return *result;
+    const int signal = InterruptGuard::received();
+    return fail(signal != 0 ? 128 + signal : exit_code_of(result.error().code), result.error().message);
   }
   fmt::print("{}", help_text);
   return help->parsed() ? kExitSuccess : kExitUsage;
@@ -72,8 +93,11 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     semvslam::keep_images_out_of_the_heap();
-    return semvslam::run(argc, argv);
+    const int code = semvslam::run(argc, argv);
+    if (std::fflush(stdout) == 0) return code;
+    return semvslam::fail(semvslam::kExitIo, std::string("standard output: cannot write: ") + std::strerror(errno));
   } catch (const std::exception& e) {
+    if (std::ferror(stdout) != 0) return semvslam::fail(semvslam::kExitIo, std::string("standard output: ") + e.what());
     return semvslam::fail(semvslam::kExitInternal, std::string("internal: ") + e.what());
   }
 }

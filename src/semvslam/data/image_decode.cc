@@ -11,7 +11,7 @@
 namespace semvslam {
 namespace {
 
-Error corrupt(const char* what) { return {ErrorCode::kIo, what}; }
+Error corrupt(const char* what) { return {ErrorCode::kInvalidInput, what}; }
 
 const char* bits_name(int cv_depth) {
   switch (cv_depth) {

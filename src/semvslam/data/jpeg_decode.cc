@@ -27,8 +27,10 @@ struct JpegDecoder::Handle {
     const std::string_view message = tjGetErrorStr2(turbo);
     if (tjGetErrorCode(turbo) == TJERR_WARNING && message.find("extraneous bytes") != std::string_view::npos)
       return Status::success();
-    if (message.find("remature end") != std::string_view::npos) return Error{ErrorCode::kIo, "the JPEG is truncated"};
-    return Error{ErrorCode::kIo, "the JPEG is corrupt (" + std::string(message.substr(0, message.find('\n'))) + ")"};
+    if (message.find("remature end") != std::string_view::npos)
+      return Error{ErrorCode::kInvalidInput, "the JPEG is truncated"};
+    return Error{ErrorCode::kInvalidInput,
+                 "the JPEG is corrupt (" + std::string(message.substr(0, message.find('\n'))) + ")"};
   }
 };
 

@@ -15,7 +15,7 @@ constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '
 constexpr std::size_t kHeaderBytes = 13, kChunkOverhead = 12;  // length, type, checksum
 constexpr std::size_t kMaxDeflateRatio = 1032;                 // 258 bytes from 2 bits
 
-Error corrupt(const char* what) { return {ErrorCode::kIo, what}; }
+Error corrupt(const char* what) { return {ErrorCode::kInvalidInput, what}; }
 Error truncated() { return corrupt("the PNG is truncated"); }
 
 std::uint32_t big_endian_32(const std::uint8_t* p) {

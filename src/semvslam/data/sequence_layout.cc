@@ -155,9 +155,9 @@ Result<FileList> read_list(const fs::path& path, SequenceLayout& layout) {
   if (!text) return text.error();
   Result<FileList> list = parse_file_list(*text, path.string());
   if (!list) return list.error();
-  if (list->entries.empty()) return invalid(path, "no image in the list");
-  if (const std::string odd = list->oddities(); !odd.empty())
-    layout.warnings.push_back(path.filename().string() + ": " + odd);
+  const std::string odd = list->oddities();
+  if (list->entries.empty()) return invalid(path, "no image in the list" + (odd.empty() ? "" : ": " + odd));
+  if (!odd.empty()) layout.warnings.push_back(path.filename().string() + ": " + odd);
   return list;
 }
 

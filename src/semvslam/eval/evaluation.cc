@@ -9,13 +9,14 @@ std::string span_text(const Trajectory& t) {
   return fmt::format("{:.3f}..{:.3f} s", t.front().stamp.seconds(), t.back().stamp.seconds());
 }
 
+std::string poses(const Trajectory& t) { return fmt::format("{} {}", t.size(), t.size() == 1 ? "pose" : "poses"); }
+
 }  // namespace
 
 Result<Evaluation> evaluate(const Trajectory& reference, const Trajectory& estimate, const EvaluationOptions& options) {
   const auto invalid = [](std::string message) { return Error{ErrorCode::kInvalidInput, std::move(message)}; };
-  if (reference.size() < 3)
-    return invalid(fmt::format("the ground truth has {} poses; 3 are needed", reference.size()));
-  if (estimate.size() < 3) return invalid(fmt::format("the estimate has {} poses; 3 are needed", estimate.size()));
+  if (reference.size() < 3) return invalid(fmt::format("the ground truth has {}; 3 are needed", poses(reference)));
+  if (estimate.size() < 3) return invalid(fmt::format("the estimate has {}; 3 are needed", poses(estimate)));
 
   Evaluation out;
   out.reference_poses = reference.size();

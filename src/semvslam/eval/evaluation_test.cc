@@ -32,7 +32,7 @@ std::string error_of(const Trajectory& reference, const Trajectory& estimate) {
 }
 
 TEST(Evaluate, RefusesWhatCannotBeCompared) {
-  EXPECT_EQ(error_of(circle(1), circle(60)), "the ground truth has 1 poses; 3 are needed");
+  EXPECT_EQ(error_of(circle(1), circle(60)), "the ground truth has 1 pose; 3 are needed");
   EXPECT_EQ(error_of(circle(60), circle(2)), "the estimate has 2 poses; 3 are needed");
   EXPECT_EQ(
       error_of(circle(60), circle(60, 500)),
