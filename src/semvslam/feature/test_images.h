@@ -12,9 +12,12 @@ inline cv::Mat rectangles_image(int width, int height, int seed = 1, int largest
   cv::RNG random(static_cast<std::uint64_t>(seed));
   const int count = 4 * width * height / (largest_px * largest_px) + 4;
   for (int i = 0; i < count; ++i) {
-    const cv::Rect r(random.uniform(-10, width), random.uniform(-10, height), random.uniform(4, largest_px),
-                     random.uniform(4, largest_px));
-    cv::rectangle(image, r, cv::Scalar(random.uniform(0, 256)), cv::FILLED);
+    // One draw a line: compilers differ in the order in which they evaluate arguments.
+    const int h = random.uniform(4, largest_px);
+    const int w = random.uniform(4, largest_px);
+    const int y = random.uniform(-10, height);
+    const int x = random.uniform(-10, width);
+    cv::rectangle(image, cv::Rect(x, y, w, h), cv::Scalar(random.uniform(0, 256)), cv::FILLED);
   }
   cv::GaussianBlur(image, image, cv::Size(), 0.8);
   return image;

@@ -18,8 +18,10 @@ class PlaneWorld {
     texture_.setTo(128);
     for (int i = 0; i < 6000; ++i) {  // rectangles of many sizes: corners on every level of the pyramid
       const int size = 3 + static_cast<int>(random() % 40);
-      const cv::Rect r(static_cast<int>(random() % kTexturePixels), static_cast<int>(random() % kTexturePixels), size,
-                       size / 2 + 2);
+      // One draw a line: compilers differ in the order in which they evaluate arguments.
+      const int y = static_cast<int>(random() % kTexturePixels);
+      const int x = static_cast<int>(random() % kTexturePixels);
+      const cv::Rect r(x, y, size, size / 2 + 2);
       texture_(r & cv::Rect(0, 0, kTexturePixels, kTexturePixels)).setTo(static_cast<int>(random() % 256));
     }
     cv::GaussianBlur(texture_, texture_, {}, 0.8);
