@@ -25,10 +25,10 @@ struct RunOptions {
   std::filesystem::path out;
   std::optional<std::uint64_t> max_frames;
   bool quiet = false;
-  std::filesystem::path debug_frames;  // folder for a picture per frame of what was taken for moving; empty = none
+  std::filesystem::path debug_frames;     // folder for a picture per frame of what was taken for moving; empty = none
   std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
-  std::filesystem::path truth_masks;   // folder of true masks to judge the policy by; empty = none
-  ProcessTime before;                  // spent on something else, as the demo on rendering: not counted to the run
+  std::filesystem::path truth_masks;      // folder of true masks to judge the policy by; empty = none
+  ProcessTime before;                     // spent on something else, as the demo on rendering: not counted to the run
 };
 
 /// How a run ended; everything computed is in the output folder.
