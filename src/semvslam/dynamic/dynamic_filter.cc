@@ -72,7 +72,7 @@ struct DynamicFilter::State {
   cv::Mat expected_movers;           // where what moved in the last frame should be now
   cv::Mat avoided;                   // both: what features are not extracted from
   MotionResult motion_result;
-  double last_time_s = 0;  // of motion_result
+  double last_time_s = 0;                // of motion_result
   cv::Mat regions_mask, instances_mask;  // moving things of no class; moving instances of movable classes
   std::vector<std::uint8_t> usable;
   std::shared_ptr<DynamicRecord> record;
@@ -186,9 +186,9 @@ void DynamicFilter::State::expect_movers() {
   for (const MovingRegion& region : motion_result.regions)
     add_inside(region.window + expected_shift_px(region), region.mask);
   for (const Instance& instance : segmentation.instances)
-    if (instance.role == Role::kMovable &&
-        std::any_of(moved.begin(), moved.end(),
-                    [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); }))
+    if (instance.role == Role::kMovable && std::any_of(moved.begin(), moved.end(), [&](const MovableMemory& m) {
+          return is_same_place(m.window, instance.window);
+        }))
       add_inside(instance.window, instance.mask);
 }
 
@@ -340,14 +340,13 @@ void DynamicFilter::State::doubt_near_movers(std::span<const float> depths_m) {
   const auto add = [&](const cv::Rect& window, float depth_m) {
     if (depth_m <= 0) return;  // too near to be measured: how far its arms go in the picture is not known
     const int reach_px = cvCeil(options.reach_m * camera.fx_px / depth_m);
-    reaches.push_back({cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px,
-                                window.height + 2 * reach_px),
-                       depth_m});
+    reaches.push_back(
+        {cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px, window.height + 2 * reach_px),
+         depth_m});
   };
   for (std::size_t i = 0; i < masked_instances; ++i)
     if (masks(i))
-      add(segmentation.instances[i].window,
-          median_depth_m(segmentation.instances[i], frame.depth, metres_per_unit));
+      add(segmentation.instances[i].window, median_depth_m(segmentation.instances[i], frame.depth, metres_per_unit));
   for (const MovingRegion& region : motion_result.regions) add(region.window, region.depth_m);
   for (std::size_t i = 0; i < depths_m.size(); ++i) {
     FeatureMark& mark = record->features[i];

@@ -16,10 +16,10 @@
 namespace semvslam {
 
 struct DynamicOptions {
-  std::string masks = "off";    // off; boxes: whole boxes of instances of dynamic classes; masks: their pixels
-  bool motion = false;          // motion consistency
-  MaskFitOptions fit;           // of the masks' outlines to the depth image
-  int dilate_px = 4;            // masks grow by this: the descriptor of a corner on the outline sees both sides
+  std::string masks = "off";  // off; boxes: whole boxes of instances of dynamic classes; masks: their pixels
+  bool motion = false;        // motion consistency
+  MaskFitOptions fit;         // of the masks' outlines to the depth image
+  int dilate_px = 4;          // masks grow by this: the descriptor of a corner on the outline sees both sides
   /// An untested feature that near in space to something that moves may be a limb that the mask lacks: no landmark may
   /// come from it. An arm or a leg is that long; 0 = off.
   double reach_m = 0.6;
@@ -30,7 +30,7 @@ struct DynamicOptions {
   /// An instance of a dynamic class none of whose parts has moved for that long counts as static until it moves; 0 =
   /// never. For people who sit or sleep and fill the picture; needs motion consistency.
   double rest_after_s = 0;
-  RepairOptions restoration;    // of missed segmentations
+  RepairOptions restoration;  // of missed segmentations
   MotionOptions motion_options;
 
   void add_to(ConfigSchema& schema);

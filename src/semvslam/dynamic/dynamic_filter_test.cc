@@ -198,7 +198,8 @@ TEST(DynamicFilter, NoFeaturesAreExtractedWhereAMoverIsExpectedUnlessTooFewAreLe
   const RgbdFrame frame = make_frame(12, 60 + 12 * 4);
   filter.begin(frame, nullptr, SE3());
   ASSERT_FALSE(filter.excluded().empty());
-  const cv::Rect board(60 + 12 * 4, 70, 80, 100), inside(board.x + 15, board.y + 15, board.width - 30, board.height - 30);
+  const cv::Rect board(60 + 12 * 4, 70, 80, 100),
+      inside(board.x + 15, board.y + 15, board.width - 30, board.height - 30);
   EXPECT_GT(cv::countNonZero(filter.excluded()(inside)), inside.area() * 9 / 10);
   cv::Mat elsewhere = filter.excluded().clone();
   elsewhere(cv::Rect(board.x - 14, board.y - 14, board.width + 28, board.height + 28)).setTo(0);

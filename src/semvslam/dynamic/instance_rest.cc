@@ -5,11 +5,12 @@
 namespace semvslam {
 namespace {
 
-constexpr int kLeastPoints = 8;           // with a verdict: fewer say nothing of a whole person
-constexpr int kMovingPoints = 2;          // one alone may be an error of the flow
-constexpr double kMovingShare = 0.1;      // a hand is some of twenty points; errors are one in a hundred
-constexpr double kForgetAfterS = 1;       // not seen for that long: whoever comes next is another
-constexpr double kUnwatchedAfterS = 0.5;  // after it was seen to move: points in a walker cost time and tell nothing new
+constexpr int kLeastPoints = 8;       // with a verdict: fewer say nothing of a whole person
+constexpr int kMovingPoints = 2;      // one alone may be an error of the flow
+constexpr double kMovingShare = 0.1;  // a hand is some of twenty points; errors are one in a hundred
+constexpr double kForgetAfterS = 1;   // not seen for that long: whoever comes next is another
+constexpr double kUnwatchedAfterS =
+    0.5;  // after it was seen to move: points in a walker cost time and tell nothing new
 
 }  // namespace
 

@@ -13,8 +13,8 @@ namespace semvslam {
 /// Whether two windows are those of one thing, a frame apart: their intersection over union is above 0.3.
 bool is_same_place(const cv::Rect& a, const cv::Rect& b);
 
-/// Remembers of every instance of a dynamic class since when none of it has been seen to move: a person who sits or sleeps
-/// may be part of the static scene until she moves. Without evidence (too few points in her) she does not rest.
+/// Remembers of every instance of a dynamic class since when none of it has been seen to move: a person who sits or
+/// sleeps may be part of the static scene until she moves. Without evidence (too few points in her) she does not rest.
 class InstanceRest {
  public:
   /// @param rest_after_s how long nothing of an instance may have moved; 0 = none ever rests.

@@ -36,7 +36,8 @@ cv::Mat MaskRuns::mask() const {
   cv::Mat mask = cv::Mat::zeros(size_, CV_8UC1);
   for (int y = 0; y + 1 < static_cast<int>(first_.size()); ++y)
     for (std::uint32_t i = first_[static_cast<std::size_t>(y)]; i < first_[static_cast<std::size_t>(y) + 1]; ++i)
-      std::fill(mask.ptr<std::uint8_t>(y) + runs_[i].begin, mask.ptr<std::uint8_t>(y) + runs_[i].end, std::uint8_t{255});
+      std::fill(mask.ptr<std::uint8_t>(y) + runs_[i].begin, mask.ptr<std::uint8_t>(y) + runs_[i].end,
+                std::uint8_t{255});
   return mask;
 }
 

@@ -6,8 +6,8 @@
 
 namespace semvslam {
 
-/// A mask kept small, as the runs of set pixels of each row: some kilobytes where the image takes 300. For masks that are
-/// kept for long, like those of key frames.
+/// A mask kept small, as the runs of set pixels of each row: some kilobytes where the image takes 300. For masks that
+/// are kept for long, like those of key frames.
 class MaskRuns {
  public:
   /// Set nowhere, of no size.

@@ -17,11 +17,11 @@ void set_ellipse(cv::Mat& mask, const cv::Point& centre, int half_width, int hal
 
 TEST(MaskRuns, GivesBackTheMaskItWasMadeFrom) {
   cv::Mat mask = cv::Mat::zeros(48, 64, CV_8UC1);
-  mask(cv::Rect(0, 0, 64, 1)).setTo(255);    // a full row
-  mask(cv::Rect(63, 40, 1, 8)).setTo(255);   // to the right and lower border
+  mask(cv::Rect(0, 0, 64, 1)).setTo(255);   // a full row
+  mask(cv::Rect(63, 40, 1, 8)).setTo(255);  // to the right and lower border
   set_ellipse(mask, {30, 20}, 10, 10, 255);
-  set_ellipse(mask, {30, 20}, 6, 6, 0);      // a ring: two runs a row
-  mask(cv::Rect(5, 30, 3, 2)).setTo(1);      // any value but 0 counts
+  set_ellipse(mask, {30, 20}, 6, 6, 0);  // a ring: two runs a row
+  mask(cv::Rect(5, 30, 3, 2)).setTo(1);  // any value but 0 counts
   const MaskRuns runs(mask);
   EXPECT_TRUE(runs.is_set_anywhere());
   EXPECT_EQ(runs.size(), mask.size());
