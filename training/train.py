@@ -32,8 +32,8 @@ def arguments():
     a.add_argument("--until", help="UTC time of the day HH:MM to end at")
     a.add_argument("--minutes", type=float, default=60, help="how long, without --until")
     a.add_argument("--lr", type=float, default=7e-4)
-    a.add_argument("--backbone-lr", type=float, default=0.25, help="as a share of --lr")
-    a.add_argument("--freeze", type=int, default=7, help="leading backbone blocks that keep their start weights")
+    a.add_argument("--backbone-lr", type=float, default=0.3, help="as a share of --lr")
+    a.add_argument("--freeze", type=int, default=5, help="leading backbone blocks that keep their start weights")
     a.add_argument("--processes", type=int, default=2, help="each takes its share of every batch; faster on CPUs than threads")
     a.add_argument("--threads", type=int, default=1, help="per process")
     a.add_argument("--workers", type=int, default=1, help="loaders per process")
@@ -98,7 +98,7 @@ def main():
     torch.manual_seed(o.seed * 1000 + rank + 7919 * step)
     data.seed = [*data.seed, rank]
     frozen = None
-    if o.freeze == 7 and o.backbone == "mobilenet_v2":
+    if o.freeze and o.backbone == "mobilenet_v2":
         try:
             frozen = backbones.Frozen(net.backbone, o.threads)
         except ImportError:
@@ -121,7 +121,7 @@ def main():
         if frozen:
             x = frozen(x)
         with torch.autocast("cpu", torch.bfloat16):
-            loss, parts = losses.losses(net, x, targets, size, 7 if frozen else 0)
+            loss, parts = losses.losses(net, x, targets, size, frozen.done if frozen else 0)
         opt.zero_grad(set_to_none=True)
         loss.backward()
         clock_now = torch.tensor([(time.time() - begin) / (end - begin), float(torch.isfinite(loss)), float(len(x))])

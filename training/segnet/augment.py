@@ -13,23 +13,29 @@ def affine(scale, degrees, mirrored, source, target):
     return np.hstack([m, t[:, None]])
 
 
-def random_affine(rng, size, canvas, persons):
-    """size, canvas: (h, w). persons: boxes x0 y0 x1 y1 of the image."""
+def random_affine(rng, size, canvas, persons, full, plain):
+    """size, canvas, full: (h, w). persons: boxes x0 y0 x1 y1 of the image.
+
+    full: what the image would be fitted into; the canvas may be a part of that. plain: little is changed.
+    """
     h, w = size
     H, W = canvas
-    fit = min(H / h, W / w)
-    roll = rng.uniform(-45, 45) if rng.random() < 0.12 else rng.normal(0, 5)
+    fit = min(full[0] / h, full[1] / w)
+    roll = rng.normal(0, 1) if plain else rng.uniform(-45, 45) if rng.random() < 0.1 else rng.normal(0, 4)
     mirrored = rng.random() < 0.5
-    if len(persons) and rng.random() < 0.4:
+    if len(persons) and not plain and rng.random() < 0.35:
         # Near bodies: headless, legs only, an arm at the border. The body is up to twice as tall as the picture.
         x0, y0, x1, y1 = persons[rng.integers(len(persons))]
         extent = max(y1 - y0, x1 - x0, 20.0)
-        scale = np.exp(rng.uniform(np.log(0.45), np.log(2.0))) * H / extent
-        scale = min(scale, fit * 4.0)                      # more would only show blur
+        scale = np.exp(rng.uniform(np.log(0.3), np.log(1.8))) * full[0] / extent
+        scale = min(scale, fit * 3.0)                      # more would only show blur
         source = (rng.uniform(x0, x1), rng.uniform(y0, y1))
         target = (rng.uniform(0.2, 0.8) * W, rng.uniform(0.2, 0.8) * H)
         return affine(scale, roll, mirrored, source, target)
-    scale = fit * np.exp(rng.uniform(np.log(0.7), np.log(2.0)))
+    scale = fit * np.exp(rng.uniform(np.log(0.8), np.log(1.2)) if plain else rng.uniform(np.log(0.75), np.log(1.6)))
+    if len(persons) and canvas != full and rng.random() < 0.7:
+        x0, y0, x1, y1 = persons[rng.integers(len(persons))]
+        return affine(scale, roll, mirrored, (rng.uniform(x0, x1), rng.uniform(y0, y1)), (rng.uniform(0.1, 0.9) * W, rng.uniform(0.1, 0.9) * H))
     # Slide so that picture and canvas overlap as far as the scale allows.
     spare_x, spare_y = W - scale * w, H - scale * h
     cx = W / 2 + rng.uniform(-0.5, 0.5) * abs(spare_x)

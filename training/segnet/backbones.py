@@ -79,7 +79,7 @@ class MobileNetV2(nn.Module):
             m.bias.data.copy_(torch.from_numpy(b))
 
     def forward(self, x, done=0):
-        """done: so many leading blocks (at most 7) were already applied to x, see Frozen."""
+        """done: so many leading blocks (at most 7, the first output) were already applied to x, see Frozen."""
         out = [x] if done == 7 else []
         for i, block in enumerate(self.features):
             if i < done:
