@@ -40,8 +40,8 @@ def main():
     for threads in o.threads:
         s = infer.Segmenter(infer.OpenVino(o.models, threads, o.precision, **files))
         x = np.zeros((1, 3, *s.g.size), np.float32)
-        boxes, masks = np.zeros((50, 7, 7, 96), np.float32), np.zeros((4, 14, 14, 96), np.float32)
-        for name, call in (("trunk", lambda: s.g.trunk(x)), ("box head, 50 regions", lambda: s.g.box(boxes)),
+        boxes, masks = np.zeros((infer.PROPOSALS, 7, 7, 96), np.float32), np.zeros((4, 14, 14, 96), np.float32)
+        for name, call in (("trunk", lambda: s.g.trunk(x)), (f"box head, {infer.PROPOSALS} regions", lambda: s.g.box(boxes)),
                            ("mask head, 4 regions", lambda: s.g.mask(masks))):
             call()
             print(f"{threads} threads  {name:22} {laps(call, o.repeats)}", flush=True)

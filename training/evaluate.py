@@ -51,7 +51,7 @@ def open_model(path, size, threads=2):
     with open(os.path.join(path, "model.json")) as f:
         m = json.load(f)
     graphs = infer.OpenVino(path, threads, trunk=m["trunk"], box=m["box"], mask=m["mask"])
-    return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"]), m["classes"]
+    return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"]), m["classes"]
 
 
 def iou(a, b):
@@ -156,7 +156,7 @@ def main():
     a.add_argument("--sequence", nargs="*", default=[])
     a.add_argument("--step", type=int, default=5, help="every so many frames of a sequence")
     a.add_argument("--score", type=float, default=0.5)
-    a.add_argument("--size", default="384x512", help="for a check point")
+    a.add_argument("--size", default="480x640", help="for a check point")
     a.add_argument("--json")
     o = a.parse_args()
     seg, names = open_model(o.model, tuple(int(v) for v in o.size.split("x")))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Check point -> three ONNX graphs (trunk, box head, mask head), model.json, and INT8 forms where wanted.
 
-usage: export.py CHECKPOINT OUT_DIR [--size 384x512] [--int8 COCO_JSON IMAGES]
+usage: export.py CHECKPOINT OUT_DIR [--size 480x640] [--int8 COCO_JSON IMAGES]
 """
 import argparse
 import copy
@@ -180,7 +180,7 @@ def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("checkpoint")
     a.add_argument("out")
-    a.add_argument("--size", default="384x512")
+    a.add_argument("--size", default="480x640")
     a.add_argument("--int8", nargs=2, metavar=("COCO_JSON", "IMAGES"))
     a.add_argument("--keep-float", nargs="*", default=[], choices=("trunk", "box", "mask"))
     o = a.parse_args()

@@ -74,7 +74,7 @@ def main():
     with open(os.path.join(o.models, "model.json")) as f:
         m = json.load(f)
     graphs = infer.OpenVino(o.models, 1, o.precision, m["trunk"], m["box"], m["mask"])
-    seg = infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"])
+    seg = infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"])
     os.makedirs(o.out, exist_ok=True)
     bgr = picture()
     cv2.imwrite(os.path.join(o.out, "picture.png"), bgr)

@@ -20,7 +20,7 @@ CLIP = math.log(1000.0 / 16.0)
 BOX_WEIGHTS = np.array((10.0, 10.0, 5.0, 5.0), np.float32)
 BOX_LEVELS, MASK_LEVELS = (112.0, 336.0), (224.0,)
 GREY = 127
-PROPOSALS_PER_LEVEL, PROPOSALS = 300, 50
+PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 
 
@@ -36,10 +36,10 @@ def letterbox(bgr, size):
     return out, nw / w, nh / h
 
 
-def anchors(level, h, w):
+def anchors(level, h, w, sizes):
     s = STRIDES[level]
     cell = np.array([[-a / math.sqrt(r) / 2, -a * math.sqrt(r) / 2, a / math.sqrt(r) / 2, a * math.sqrt(r) / 2]
-                     for a in SIZES[level] for r in RATIOS], np.float32)
+                     for a in sizes[level] for r in RATIOS], np.float32)
     x, y = np.meshgrid((np.arange(w) + 0.5) * s, (np.arange(h) + 0.5) * s)
     c = np.stack((x, y, x, y), -1).reshape(-1, 1, 4).astype(np.float32)
     return (c + cell[None]).reshape(-1, 4)
@@ -163,10 +163,10 @@ class OpenVino:
 
 
 class Segmenter:
-    def __init__(self, graphs, share=0.5, threshold=0.48):
+    def __init__(self, graphs, share=0.5, threshold=0.48, sizes=SIZES):
         self.g, self.share, self.threshold = graphs, share, threshold
         H, W = graphs.size
-        self.anchors = [anchors(i, H // s, W // s) for i, s in enumerate(STRIDES)]
+        self.anchors = [anchors(i, H // s, W // s, sizes) for i, s in enumerate(STRIDES)]
         self.times = {}
 
     def lap(self, name, since):
@@ -267,7 +267,7 @@ def main():
     with open(os.path.join(o.models, "model.json")) as f:
         about = json.load(f)
     s = Segmenter(OpenVino(o.models, o.threads, trunk=about["trunk"], box=about["box"], mask=about["mask"]),
-                  about["semantic_share"], about["mask_threshold"])
+                  about["semantic_share"], about["mask_threshold"], about["anchor_sizes"])
     for path in o.images:
         bgr = cv2.imread(path)
         if bgr is None:

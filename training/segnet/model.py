@@ -101,7 +101,7 @@ class MaskRcnn(nn.Module):
 
     @staticmethod
     @torch.no_grad()
-    def proposals(objectness, deltas, anchors, size, before=300, after=50, threshold=0.7):
+    def proposals(objectness, deltas, anchors, size, before=300, after=100, threshold=0.7):
         """Per picture: best `before` of each level, decoded, NMS over all levels together, best `after`."""
         out = []
         for b in range(objectness[0].shape[0]):

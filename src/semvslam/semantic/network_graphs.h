@@ -35,7 +35,7 @@ struct BoxHeadOutput {
 /// The three parts of a network as some inference library runs them. Not safe for concurrent use.
 class NetworkGraphs {
  public:
-  static constexpr int kBoxBatch = 50, kBoxCells = 7;  // regions of one call of the box head; cells along an edge
+  static constexpr int kBoxBatch = 100, kBoxCells = 7;  // regions of one call of the box head; cells along an edge
   static constexpr int kMaskBatch = 4, kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
 
   virtual ~NetworkGraphs() = default;

@@ -34,7 +34,7 @@ class Segmenter {
   /// An image without any object is a Segmentation without instances.
   virtual Result<Segmentation> segment(const SegmentationRequest& request) = 0;
   virtual const std::vector<std::string>& class_names() const = 0;
-  /// 10^9 operations (two to a multiply-add) of an image with 50 proposals and 5 masks; 0 = none or not known.
+  /// 10^9 operations (two to a multiply-add) of an image with 100 proposals and 5 masks; 0 = none or not known.
   virtual double gflops() const { return 0; }
   /// One line for logs.
   virtual std::string description() const = 0;
