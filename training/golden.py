@@ -2,8 +2,8 @@
 """Writes a synthetic picture and what the reference makes of it, for the test of another implementation.
 
 usage: golden.py MODEL_DIR OUT_DIR
-picture.png and golden.json: the small steps on formula-made data (`roi_align`, `nms`, `paste`, `decode`), and on the picture the
-proposals, the detections and single values of the graphs' outputs.
+picture.png and golden.json: the small steps on formula-made data (`roi_align`, `nms`, `paste`, `decode`), on the picture the
+proposals and single values of the graphs' outputs, and on OUT_DIR/people.jpg, a rendered frame, the detections.
 """
 import argparse
 import json
@@ -81,7 +81,7 @@ def main():
     rgb, fx, fy = infer.letterbox(bgr, graphs.size)
     x = np.ascontiguousarray(rgb.transpose(2, 0, 1)[None], np.float32) / 127.5 - 1
     t = {k: v.copy() for k, v in graphs.trunk(x).items()}
-    found = seg(bgr, 0.05)
+    found = seg(cv2.imread(os.path.join(o.out, "people.jpg")), 0.05)
     out = {"model": m["name"], "trunk": m["trunk"], "precision": o.precision, "resize": [fx, fy],
            "input_sum": float(rgb.astype(np.int64).sum()),
            "trunk_outputs": {k: {"shape": list(v.shape), "mean": float(v.mean()), "first_cell": listed(v[0, 0, 0, :6]),

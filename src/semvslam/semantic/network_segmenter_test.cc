@@ -141,7 +141,7 @@ TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
 TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {
   const auto model = ModelDescription::read(kModels);
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_NEAR(model->gflops.of_image(50, 5), 4.33, 0.01);  // training/table2.py, the default network
+  EXPECT_NEAR(model->gflops.of_image(NetworkGraphs::kBoxBatch, 5), 6.55, 0.01);  // training/table2.py
 }
 
 /// The shipped network; these need OpenVINO.
@@ -166,7 +166,7 @@ TEST_F(ShippedNetwork, FindsWhatTheReferenceFinds) {
   ASSERT_TRUE(segmenter) << segmenter.error().message;
   std::ifstream file(kModels / "golden" / "golden.json");
   const nlohmann::json wanted = nlohmann::json::parse(file).at("detections");
-  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  const cv::Mat picture = cv::imread((kModels / "golden" / "people.jpg").string());
   ASSERT_FALSE(picture.empty());
   const Result<Segmentation> s = (*segmenter)->segment(request(picture));
   ASSERT_TRUE(s) << s.error().message;
@@ -186,12 +186,12 @@ TEST_F(ShippedNetwork, FindsWhatTheReferenceFinds) {
 }
 
 TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
-  const cv::Mat picture = cv::imread((kModels / "golden" / "picture.png").string());
+  const cv::Mat picture = cv::imread((kModels / "golden" / "people.jpg").string());
   auto one = make(1);
   ASSERT_TRUE(one);
   const auto a = (*one)->segment(request(picture));
   ASSERT_TRUE(a);
-  EXPECT_GT(a->instances.size(), 2u);  // at the low score of make(): enough to differ in
+  EXPECT_GE(a->instances.size(), 2u);  // enough to differ in
   for (const int threads : {2, 3, 8}) {
     auto more = make(threads);
     ASSERT_TRUE(more);
