@@ -47,16 +47,16 @@ Result<int> demo(const DemoArguments& a) {
   const fs::path sequence =
       cache / fmt::format("demo_{}_{}_{}_{}x{}_{}_{}", SEMVSLAM_VERSION, a.scene.people, a.scene.motion,
                           a.scene.width_px, a.scene.height_px, a.scene.frames, a.scene.seed);
-  std::error_code code;
-  fs::create_directories(a.out, code);  // now: rendering takes long enough to find out afterwards
-  if (code)
+  std::error_code error;
+  fs::create_directories(a.out, error);  // now: rendering takes long enough to find out afterwards
+  if (error)
     return Error{ErrorCode::kIo,
-                 fmt::format("{}: cannot make this folder for the results ({})", a.out, code.message())};
+                 fmt::format("{}: cannot make this folder for the results ({})", a.out, error.message())};
   if (!fs::exists(sequence)) {
-    fs::create_directories(cache, code);
-    if (code)
+    fs::create_directories(cache, error);
+    if (error)
       return Error{ErrorCode::kIo,
-                   fmt::format("{}: cannot make the cache folder ({})", cache.string(), code.message())};
+                   fmt::format("{}: cannot make the cache folder ({})", cache.string(), error.message())};
     if (!a.quiet) fmt::print(stderr, "rendering {} frames to {}\n", a.scene.frames, sequence.string());
     if (const Status status = render_to_folder(a.scene, sequence, false, a.quiet); !status) return status.error();
   }
