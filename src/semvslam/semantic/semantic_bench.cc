@@ -19,7 +19,7 @@ void BM_segment(benchmark::State& state) {
   StageTimers timers;
   auto segmenter = make_segmenter(options, RoleTable(), &timers);
   if (!segmenter) return state.SkipWithError(segmenter.error().message.c_str());
-  const cv::Mat image = cv::imread(file ? file : options.model + "/golden/picture.png");
+  const cv::Mat image = cv::imread(file ? file : options.model + "/golden/people.jpg");
   std::size_t found = 0;
   for (auto _ : state) {
     const auto s = (*segmenter)->segment({FrameId(0), TimeStamp{}, image, ""});
