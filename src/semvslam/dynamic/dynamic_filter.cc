@@ -37,7 +37,11 @@ float median_depth_m(const Instance& instance, const cv::Mat& depth, float metre
 
 struct DynamicFilter::State {
   State(const Camera& c, const DynamicOptions& o)
-      : camera(c), options(o), size(c.width_px, c.height_px), rest(o.rest_after_s) {
+      : camera(c),
+        options(o),
+        size(c.width_px, c.height_px),
+        metres_per_unit(static_cast<float>(1.0 / c.depth_units_per_m)),
+        rest(o.rest_after_s) {
     if (o.needs_segmentation()) repair.emplace(c, o.restoration);
     if (o.motion) motion.emplace(c, o.motion_options);
   }
@@ -58,6 +62,7 @@ struct DynamicFilter::State {
   const Camera camera;
   const DynamicOptions options;
   const cv::Size size;
+  const float metres_per_unit;
   std::optional<SegmentationRepair> repair;
   std::optional<MotionDetector> motion;
   InstanceRest rest;
@@ -82,6 +87,10 @@ struct DynamicFilter::State {
     double moved_at_s = 0;
   };
   std::vector<MovableMemory> moved;
+  std::vector<MovableMemory>::iterator memory_of(const Instance& instance) {
+    return std::find_if(moved.begin(), moved.end(),
+                        [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
+  }
   std::vector<MotionVerdict> verdicts;  // scratch
 };
 
@@ -123,7 +132,9 @@ void DynamicFilter::State::use_segmentation(const Segmentation* given) {
   }
 }
 
+/// @param target made, all zero, where it is empty.
 void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool whole_box) const {
+  if (target.empty()) target = cv::Mat::zeros(size, CV_8UC1);
   const cv::Rect all(cv::Point(), size);
   if (whole_box) {
     const cv::Rect box(cv::Point(cvFloor(instance.box.x), cvFloor(instance.box.y)),
@@ -146,11 +157,9 @@ void DynamicFilter::State::compose_mask() {
   const bool boxes = options.masks == "boxes";
   for (std::size_t i = 0; i < masked_instances; ++i) {
     if (!masks(i)) continue;
-    if (excluded.empty()) excluded = cv::Mat::zeros(size, CV_8UC1);
     paint(excluded, segmentation.instances[i], boxes);
   }
-  if (!excluded.empty() && !boxes)
-    fit_to_depth(excluded, frame.depth, static_cast<float>(1.0 / camera.depth_units_per_m), options.fit);
+  if (!excluded.empty() && !boxes) fit_to_depth(excluded, frame.depth, metres_per_unit, options.fit);
   if (!frame.mask.empty()) {
     if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
     if (excluded.empty())
@@ -186,9 +195,7 @@ void DynamicFilter::State::expect_movers() {
   for (const MovingRegion& region : motion_result.regions)
     add_inside(region.window + expected_shift_px(region), region.mask);
   for (const Instance& instance : segmentation.instances)
-    if (instance.role == Role::kMovable && std::any_of(moved.begin(), moved.end(), [&](const MovableMemory& m) {
-          return is_same_place(m.window, instance.window);
-        }))
+    if (instance.role == Role::kMovable && memory_of(instance) != moved.end())
       add_inside(instance.window, instance.mask);
 }
 
@@ -272,7 +279,7 @@ cv::Mat DynamicFilter::State::watched_parts(double time_s) const {
   bool own = false;  // not yet: the filter's mask may only be read
   for (std::size_t i = 0; i < masked_instances; ++i) {
     if (!masks(i) || !rest.is_worth_watching(segmentation.instances[i], time_s)) continue;
-    if (!own) watched = watched.empty() ? cv::Mat::zeros(size, CV_8UC1) : watched.clone();
+    if (!own) watched = watched.clone();
     own = true;
     paint(watched, segmentation.instances[i], false);
   }
@@ -298,13 +305,11 @@ void DynamicFilter::State::find_moving_instances(double time_s) {
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const Instance& instance = segmentation.instances[i];
     if (rested[i] && !rest.rests(instance)) {  // she has just moved: her features were taken, and go
-      if (instances_mask.empty()) instances_mask = cv::Mat::zeros(size, CV_8UC1);
       paint(instances_mask, instance, false);
       ++record->moving_instances;
     }
     if (instance.role != Role::kMovable) continue;
-    const auto memory = std::find_if(moved.begin(), moved.end(),
-                                     [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
+    const auto memory = memory_of(instance);
     const bool moves =
         motions[i].moving >= options.movable_points && motions[i].moving_share() >= options.movable_share;
     if (!moves && memory == moved.end()) continue;
@@ -312,7 +317,6 @@ void DynamicFilter::State::find_moving_instances(double time_s) {
       moved.push_back({instance.window, time_s});
     else
       *memory = {instance.window, moves ? time_s : memory->moved_at_s};
-    if (instances_mask.empty()) instances_mask = cv::Mat::zeros(size, CV_8UC1);
     paint(instances_mask, instance, false);
     ++record->moving_instances;
   }
@@ -336,7 +340,6 @@ void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
 void DynamicFilter::State::doubt_near_movers(std::span<const float> depths_m) {
   if (options.reach_m <= 0) return;
   std::vector<Reach> reaches;
-  const float metres_per_unit = static_cast<float>(1.0 / camera.depth_units_per_m);
   const auto add = [&](const cv::Rect& window, float depth_m) {
     if (depth_m <= 0) return;  // too near to be measured: how far its arms go in the picture is not known
     const int reach_px = cvCeil(options.reach_m * camera.fx_px / depth_m);
