@@ -78,7 +78,8 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                      {"kept_on_moving", run.truth->kept_on_moving.value()},
                      {"tracked_on_moving", run.truth->tracked_on_moving.value()},
                      {"static_dropped", run.truth->static_dropped.value()},
-                     {"clear_static_dropped", run.truth->clear_static_dropped.value()}};
+                     {"clear_static_dropped", run.truth->clear_static_dropped.value()},
+                     {"static_barred", run.truth->static_barred.value()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

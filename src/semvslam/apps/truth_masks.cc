@@ -38,7 +38,9 @@ class FolderTruth final : public TruthMaskSink {
     }
     // Single points outside every mask and region are dropped too.
     for (const FeatureMark& mark : result.dynamic->features) {
-      if (mark.reason != FeatureReason::kPointMotion || is_masked(moving, mark.pixel)) continue;
+      if (is_masked(moving, mark.pixel) || is_masked(result.dynamic->moving, mark.pixel)) continue;
+      if (mark.use != kNotUsed) counts_.static_barred.count(mark.use == kKnownLandmarkOnly && !mark.tracked);
+      if (mark.reason != FeatureReason::kPointMotion) continue;
       ++counts_.static_dropped.part;
       counts_.clear_static_dropped.part += !is_masked(near_moving, mark.pixel);
     }

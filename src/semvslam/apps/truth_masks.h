@@ -24,6 +24,8 @@ struct TruthCounts {
   /// The same of those whose surroundings are static too: a descriptor at an outline sees both sides, and the policy
   /// drops it by intention.
   Share clear_static_dropped;
+  /// Of the features on the static scene that are not dropped: those that no landmark was found at and may come from.
+  Share static_barred;
 };
 
 /// Compares what the policy left out with true masks. Extracts the features of every whole image once more to know what

@@ -4,17 +4,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "semvslam/dynamic/instance_rest.h"
+#include "semvslam/dynamic/mover_reach.h"
 #include "semvslam/geometry/depth_image.h"
 #include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {
 namespace {
-
-/// Where the limbs of something that moves may be.
-struct Reach {
-  cv::Rect window;
-  float depth_m = 0;
-};
 
 /// Of the instance's pixels, on a raster; 0 = none is measured.
 float median_depth_m(const Instance& instance, const cv::Mat& depth, float metres_per_unit) {
@@ -55,7 +50,7 @@ struct DynamicFilter::State {
   cv::Mat watched_parts(double time_s) const;
   void find_moving_instances(double time_s);
   void mark_features(std::span<const cv::Point2f> pixels);
-  void doubt_near_movers(std::span<const float> depths_m);
+  void doubt_near_movers();
   void open_if_needed(std::span<const float> depths_m);
   void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
 
@@ -255,7 +250,7 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.moving_regions = static_cast<int>(s.motion_result.regions.size());
   s.add_moving_things(frame.time_s);
   s.mark_features(pixels);
-  s.doubt_near_movers(depths_m);
+  s.doubt_near_movers();
   s.open_if_needed(depths_m);
   return s.usable;
 }
@@ -337,27 +332,21 @@ void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
   }
 }
 
-void DynamicFilter::State::doubt_near_movers(std::span<const float> depths_m) {
+void DynamicFilter::State::doubt_near_movers() {
   if (options.reach_m <= 0) return;
-  std::vector<Reach> reaches;
-  const auto add = [&](const cv::Rect& window, float depth_m) {
-    if (depth_m <= 0) return;  // too near to be measured: how far its arms go in the picture is not known
-    const int reach_px = cvCeil(options.reach_m * camera.fx_px / depth_m);
-    reaches.push_back(
-        {cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px, window.height + 2 * reach_px),
-         depth_m});
-  };
-  for (std::size_t i = 0; i < masked_instances; ++i)
-    if (masks(i))
-      add(segmentation.instances[i].window, median_depth_m(segmentation.instances[i], frame.depth, metres_per_unit));
-  for (const MovingRegion& region : motion_result.regions) add(region.window, region.depth_m);
-  for (std::size_t i = 0; i < depths_m.size(); ++i) {
+  MoverReach reach(camera, frame.depth, options.reach_m);
+  for (std::size_t i = 0; i < masked_instances; ++i) {
+    const Instance& instance = segmentation.instances[i];
+    if (masks(i)) reach.add(instance.window, instance.mask, median_depth_m(instance, frame.depth, metres_per_unit));
+  }
+  for (const MovingRegion& region : motion_result.regions) reach.add(region.window, region.mask, region.depth_m);
+  reach.spread();
+  for (std::size_t i = 0; i < record->features.size(); ++i) {
     FeatureMark& mark = record->features[i];
-    if (mark.verdict != FeatureVerdict::kUnknown) continue;
-    const bool near = std::any_of(reaches.begin(), reaches.end(), [&](const Reach& r) {
-      return r.window.contains(cv::Point(cvRound(mark.pixel.x), cvRound(mark.pixel.y))) &&
-             (depths_m[i] <= 0 || std::abs(depths_m[i] - r.depth_m) < options.reach_m);
-    });
+    if (mark.verdict == FeatureVerdict::kMoving) continue;
+    const bool tested = mark.verdict == FeatureVerdict::kStatic;
+    const bool near = reach.distance_m(mark.pixel) <= (tested ? options.rest_reach_m : options.reach_m) ||
+                      (!tested && reach.is_at_edge(mark.pixel));
     if (!near) continue;
     mark.reason = FeatureReason::kNearMoving;
     usable[i] = kKnownLandmarkOnly;

@@ -20,9 +20,10 @@ struct DynamicOptions {
   bool motion = false;        // motion consistency
   MaskFitOptions fit;         // of the masks' outlines to the depth image
   int dilate_px = 4;          // masks grow by this: the descriptor of a corner on the outline sees both sides
-  /// An untested feature that near in space to something that moves may be a limb that the mask lacks: no landmark may
-  /// come from it. An arm or a leg is that long; 0 = off.
+  /// A feature that no motion test was made for and that hangs on something that moves may be a limb that the mask
+  /// lacks: no landmark may come from it. Along the surface; an arm or a leg is that long; 0 = off.
   double reach_m = 0.6;
+  double rest_reach_m = 0.2;    // the same for tested ones: a limb may be at rest while the rest moves. A foot, a hand
   int least_features = 60;      // with depth; with fewer the filter opens
   double movable_share = 0.4;   // of the points of an instance of a movable class that move: it is moving
   int movable_points = 4;       // that must move at least

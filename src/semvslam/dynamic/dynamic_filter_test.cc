@@ -261,20 +261,45 @@ TEST(DynamicFilter, APersonAtRestIsUsedAndGoesTheMomentSheMoves) {
   EXPECT_TRUE(masks_anything());
 }
 
-TEST(DynamicFilter, AnUntestedFeatureWithinReachOfAPersonFoundsNoLandmark) {
+/// The board is a person whose mask lacks the arm that she holds out to the right.
+RgbdFrame make_frame_with_arm(std::uint32_t id) {
+  RgbdFrame frame = make_frame(id, 100);
+  frame.depth(cv::Rect(180, 110, 80, 24)).setTo(1.5);
+  return frame;
+}
+
+TEST(DynamicFilter, AnUntestedFeatureThatHangsOnAPersonFoundsNoLandmark) {
   DynamicFilter filter(small_camera(), with("masks", true));
-  RgbdFrame frame = make_frame(0, 100);
+  const RgbdFrame frame = make_frame_with_arm(0);
   const Segmentation person = make_segmentation(frame.id, {make_instance(Role::kDynamic, {100, 70, 80, 100}, 0.9f)});
   filter.begin(frame, &person, std::nullopt);
-  // 60 px beside her: at her depth (0.35 m away) it may be her arm; on the wall behind her it is not.
-  const std::vector<cv::Point2f> points{{240, 120}, {240, 130}, {240, 140}};
-  const std::vector<float> depths_m{1.6f, 3.0f, 0.f};
-  const std::vector<std::uint8_t> use = filter.judge(points, depths_m);
-  EXPECT_EQ(use, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kFullyUsed, kKnownLandmarkOnly}));
+  const std::vector<cv::Point2f> points{{230, 122}, {230, 108}, {230, 160}};  // arm, its outline, the wall below it
+  const std::vector<std::uint8_t> use = filter.judge(points, depths_at(points, frame.depth));
+  EXPECT_EQ(use, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kKnownLandmarkOnly, kFullyUsed}));
   filter.end(SE3(), {});
   EXPECT_EQ(filter.record()->features[0].reason, FeatureReason::kNearMoving);
   EXPECT_EQ(filter.record()->features[0].use, kKnownLandmarkOnly);
-  EXPECT_EQ(filter.record()->features[1].reason, FeatureReason::kNoEvidence);
+  EXPECT_EQ(filter.record()->features[2].reason, FeatureReason::kNoEvidence);
+}
+
+TEST(DynamicFilter, ALimbThatIsSeenToRestFoundsNoLandmarkNearTheBody) {
+  DynamicFilter filter(small_camera(), with("masks", true));
+  const std::vector<cv::Point2f> points{{196, 122}, {250, 122}, {196, 160}};  // upper arm, hand, wall below
+  std::vector<std::uint8_t> use;
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    const RgbdFrame frame = make_frame_with_arm(i);
+    const Segmentation person = make_segmentation(frame.id, {make_instance(Role::kDynamic, {100, 70, 80, 100}, 0.9f)});
+    filter.begin(frame, &person, SE3());
+    std::vector<cv::Point2f> seen = raster();
+    seen.insert(seen.begin(), points.begin(), points.end());
+    use = filter.judge(seen, depths_at(seen, frame.depth));
+    filter.end(SE3(), {});
+  }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    ASSERT_EQ(filter.record()->features[i].verdict, FeatureVerdict::kStatic) << i;
+  EXPECT_EQ(use[0], kKnownLandmarkOnly);
+  EXPECT_EQ(use[1], kFullyUsed) << "farther along the arm than dynamic.rest_reach_m";
+  EXPECT_EQ(use[2], kFullyUsed);
 }
 
 TEST(DynamicFilter, WithTooFewFeaturesLeftMotionIsDoubtedFirst) {

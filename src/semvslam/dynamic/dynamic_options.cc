@@ -13,7 +13,8 @@ void DynamicOptions::add_to(ConfigSchema& s) {
   s.add("dynamic.fit_reach_px", &fit.reach_px, {4, 1000}, "window over which the depth of a thing is averaged, px");
   s.add("dynamic.dilate_px", &dilate_px, {0, 50}, "masks grow by this, px");
   s.add("dynamic.reach_m", &reach_m, {0, 5},
-        "no landmark comes from an untested feature that near to something that moves, m; 0 = off");
+        "no landmark comes from an untested feature that near, along the surface, to something that moves, m; 0 = off");
+  s.add("dynamic.rest_reach_m", &rest_reach_m, {0, 5}, "the same for features that were seen to be at rest, m");
   s.add("dynamic.least_features", &least_features, {0, 20000},
         "features with depth below which the filter opens: motion first, then the weakest masks");
   s.add("dynamic.movable_share", &movable_share, {0, 1},

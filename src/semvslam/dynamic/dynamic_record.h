@@ -18,7 +18,7 @@ enum class FeatureVerdict : std::uint8_t { kStatic, kMoving, kUnknown };
 enum class FeatureReason : std::uint8_t {
   kNone,            // static: nothing speaks against it
   kNoEvidence,      // unknown: no test could be made
-  kNearMoving,      // unknown: no test could be made, and within reach of something that moves
+  kNearMoving,      // unknown or static: it may be a part of something that moves, which its mask lacks
   kPointMotion,     // moving: the point track beside it moves (its reason: DynamicRecord::track_reasons)
   kMovingRegion,    // moving: on a thing of no known class that moves, or did a moment ago
   kMovingInstance,  // moving: on an instance of a movable class, enough of whose points move

@@ -10,6 +10,7 @@ namespace semvslam {
 namespace {
 
 constexpr int kLongestHole = 4;  // cells without depth that a region may cross
+constexpr int kTakenHole = 1;    // of them it takes so many: beside a thing there is no depth in its projector's shadow
 
 struct Front {
   int cell;
@@ -92,7 +93,7 @@ cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std
   for (Front at{}; open.pop(cost, at);) {
     if (done[static_cast<std::size_t>(at.cell)]) continue;
     done[static_cast<std::size_t>(at.cell)] = 1;
-    if (at.ours) taken.data[at.cell] = 255;
+    if (at.ours && at.hole <= kTakenHole) taken.data[at.cell] = 255;
     const int c = at.cell % grid.columns, r = at.cell / grid.columns;
     for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       if (c + dc < 0 || r + dr < 0 || c + dc >= grid.columns || r + dr >= grid.rows) continue;

@@ -1,0 +1,111 @@
+#include "semvslam/dynamic/mover_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace semvslam {
+namespace {
+
+constexpr int kPx = CellGrid::kCellPx;
+constexpr float kBodyDepthM = 0.6f;   // no part of a thing is farther before or behind its middle
+constexpr float kLimbDepthM = 0.3f;   // nor a limb from the place where it leaves the mask
+constexpr float kStepShare = 0.025f;  // of the depth: a larger step between neighbours is an edge
+constexpr float kEdgeShare = 0.05f;   // the same between any two of the cells around a place
+constexpr int kLongestHole = 4;       // cells without depth that a surface may go on behind
+constexpr double kBucketM = 0.01;     // distances are told apart to that
+
+struct Front {
+  int cell;
+  float depth_m;         // last measured on the way
+  float origin_depth_m;  // where it left the mask
+  float distance_m;
+  int hole;  // cells without depth since the last measured one
+};
+
+}  // namespace
+
+MoverReach::MoverReach(const Camera& camera, const cv::Mat& depth, double reach_m)
+    : grid_(camera, depth),
+      fx_px_(camera.fx_px),
+      reach_m_(reach_m),
+      inside_(grid_.size(), 0),
+      distances_m_(grid_.size(), std::numeric_limits<float>::infinity()) {}
+
+void MoverReach::add(const cv::Rect& window, const cv::Mat& mask, float depth_m) {
+  if (mask.empty() || depth_m <= 0) return;
+  const int reach_px = cvCeil(std::min(reach_m_ * fx_px_ / depth_m, 1e5));
+  movers_.push_back(
+      {cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px, window.height + 2 * reach_px),
+       depth_m});
+  cv::Mat cells = cv::Mat::zeros(grid_.rows, grid_.columns, CV_8UC1), core;
+  for (int y = (window.y + kPx - 1) / kPx * kPx; y < window.br().y; y += kPx)
+    for (int x = (window.x + kPx - 1) / kPx * kPx; x < window.br().x; x += kPx)
+      cells.at<std::uint8_t>(y / kPx, x / kPx) = mask.at<std::uint8_t>(y - window.y, x - window.x);
+  // The rim of a mask may lie on what is behind it.
+  cv::erode(cells, core, cv::Mat(), {-1, -1}, 1, cv::BORDER_REPLICATE);
+  for (std::size_t cell = 0; cell < grid_.size(); ++cell) {
+    if (cells.data[cell] == 0) continue;
+    inside_[cell] = 1;
+    const float z = grid_.depth_m[cell];
+    if (core.data[cell] != 0 && z > 0 && std::abs(z - depth_m) < kBodyDepthM) cores_.push_back(static_cast<int>(cell));
+  }
+}
+
+void MoverReach::spread() {
+  const float cell_share = static_cast<float>(kPx / fx_px_);  // width of a cell, share of its depth
+  std::vector<std::vector<Front>> open(static_cast<std::size_t>(reach_m_ / kBucketM) + 2);
+  for (const int cell : cores_) {
+    const float z = grid_.depth_m[static_cast<std::size_t>(cell)];
+    open[0].push_back({cell, z, z, 0, 0});
+  }
+  for (std::size_t bucket = 0; bucket < open.size(); ++bucket)
+    for (std::size_t next = 0; next < open[bucket].size(); ++next) {
+      const Front at = open[bucket][next];  // a copy: the bucket may grow
+      float& distance_m = distances_m_[static_cast<std::size_t>(at.cell)];
+      if (distance_m <= at.distance_m) continue;
+      distance_m = at.distance_m;
+      const int c = at.cell % grid_.columns, r = at.cell / grid_.columns;
+      for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        if (c + dc < 0 || r + dr < 0 || c + dc >= grid_.columns || r + dr >= grid_.rows) continue;
+        Front to = at;
+        to.cell += dr * grid_.columns + dc;
+        const bool inside = inside_[static_cast<std::size_t>(to.cell)] != 0;
+        const float z = grid_.depth_m[static_cast<std::size_t>(to.cell)];
+        if (z > 0) {
+          const float step = kStepShare * static_cast<float>(1 + at.hole);  // a hole may hide a slope
+          if (std::abs(z - at.depth_m) > step * std::max(z, 1.f)) continue;
+          if (inside) to.origin_depth_m = z;
+          if (std::abs(z - to.origin_depth_m) > kLimbDepthM) continue;
+          to.depth_m = z;
+          to.hole = 0;
+        } else if (++to.hole > kLongestHole) {
+          continue;
+        }
+        if (!inside) to.distance_m += std::hypot(cell_share * to.depth_m, to.depth_m - at.depth_m);
+        if (to.distance_m <= reach_m_) open[static_cast<std::size_t>(to.distance_m / kBucketM)].push_back(to);
+      }
+    }
+}
+
+bool MoverReach::is_at_edge(const cv::Point2f& pixel) const {
+  const int cell = grid_.cell_of(pixel), column = cell % grid_.columns, row = cell / grid_.columns;
+  std::vector<float> around;
+  around.reserve(9);
+  for (int r = std::max(0, row - 1); r <= std::min(grid_.rows - 1, row + 1); ++r)
+    for (int c = std::max(0, column - 1); c <= std::min(grid_.columns - 1, column + 1); ++c)
+      if (const float z = grid_.depth_m[static_cast<std::size_t>(r * grid_.columns + c)]; z > 0) around.push_back(z);
+  const cv::Point place(cvRound(pixel.x), cvRound(pixel.y));
+  if (around.empty())
+    return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& m) { return m.reach.contains(place); });
+  const auto [low, high] = std::minmax_element(around.begin(), around.end());
+  if (*high - *low <= kEdgeShare * *high) return false;
+  return std::any_of(movers_.begin(), movers_.end(), [&](const Mover& m) {
+    return m.reach.contains(place) &&
+           std::any_of(around.begin(), around.end(), [&](float z) { return std::abs(z - m.depth_m) < kLimbDepthM; });
+  });
+}
+
+}  // namespace semvslam
