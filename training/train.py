@@ -97,10 +97,11 @@ def main():
 
     torch.manual_seed(o.seed * 1000 + rank + 7919 * step)
     data.seed = [*data.seed, rank]
+    short = torch.ops.mkldnn._is_mkldnn_bf16_supported()   # elsewhere bfloat16 is emulated, and several times slower
     frozen = None
     if o.freeze and o.backbone == "mobilenet_v2":
         try:
-            frozen = backbones.Frozen(net.backbone, o.threads)
+            frozen = backbones.Frozen(net.backbone, o.threads, short)
         except ImportError:
             pass
     trained = [p for g in opt.param_groups for p in g["params"]]
@@ -120,7 +121,7 @@ def main():
         x = (x.float() / 127.5 - 1).contiguous(memory_format=torch.channels_last)
         if frozen:
             x = frozen(x)
-        with torch.autocast("cpu", torch.bfloat16):
+        with torch.autocast("cpu", torch.bfloat16, enabled=short):
             loss, parts = losses.losses(net, x, targets, size, frozen.done if frozen else 0)
         opt.zero_grad(set_to_none=True)
         loss.backward()

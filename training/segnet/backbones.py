@@ -95,13 +95,14 @@ class MobileNetV2(nn.Module):
 
 
 class Frozen:
-    """The frozen leading blocks run by OpenVINO, which takes a third of PyTorch's time for them."""
+    """The frozen leading blocks run by OpenVINO, which takes a third of PyTorch's time for them. short: in bfloat16."""
 
-    def __init__(self, backbone, threads):
+    def __init__(self, backbone, threads, short):
         import openvino as ov
         self.done, self.compiled, self.ov = backbone.frozen, {}, ov
         self.part = nn.Sequential(*(b for b in backbone.features[:backbone.frozen])).to(memory_format=torch.contiguous_format)
-        self.options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1, "INFERENCE_PRECISION_HINT": "bf16"}
+        self.type = torch.bfloat16 if short else torch.float32
+        self.options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1, "INFERENCE_PRECISION_HINT": "bf16" if short else "f32"}
 
     def __call__(self, x):
         key = tuple(x.shape)
@@ -113,7 +114,7 @@ class Frozen:
             self.compiled[key] = self.ov.Core().compile_model(m, "CPU", self.options).create_infer_request()
         r = self.compiled[key]
         r.infer([x.contiguous().numpy()], share_inputs=True)
-        return torch.from_numpy(r.get_output_tensor(0).data.copy()).to(torch.bfloat16).contiguous(memory_format=torch.channels_last)
+        return torch.from_numpy(r.get_output_tensor(0).data.copy()).to(self.type).contiguous(memory_format=torch.channels_last)
 
 
 class Sliced(nn.Module):
