@@ -30,12 +30,14 @@ def main():
     a.add_argument("image")
     a.add_argument("--threads", type=int, nargs="*", default=[1, 2])
     a.add_argument("--precision")
-    a.add_argument("--float", action="store_true", help="the ONNX graphs instead of those that model.json names")
+    a.add_argument("--int8", action="store_true", help="the trunk in INT8")
+    a.add_argument("--size", help="of the network's input, height x width")
     a.add_argument("--repeats", type=int, default=40)
     o = a.parse_args()
     with open(os.path.join(o.models, "model.json")) as f:
         m = json.load(f)
-    files = {g: g + ".onnx" if o.float else m[g] for g in ("trunk", "box", "mask")}
+    files = {"trunk": m["trunk_int8" if o.int8 else "trunk"], "box": m["box"], "mask": m["mask"],
+             "size": tuple(int(v) for v in o.size.split("x")) if o.size else None}
     bgr = cv2.imread(o.image)
     for threads in o.threads:
         s = infer.Segmenter(infer.OpenVino(o.models, threads, o.precision, **files))

@@ -56,6 +56,7 @@ def main():
 |---|---|
 | `model.json` | describes the graphs; what the program reads first |
 | `trunk.onnx`, `box.onnx`, `mask.onnx` | the three graphs, float32; tensors and every step after them: `training/README.md` |
+| `trunk.int8.xml`, `trunk.int8.bin` | the first graph in eight bits, for OpenVINO on processors without 16-bit floats |
 | `scores.json`, `training_log.jsonl` | what `evaluate.py` measured; losses during the training |
 | `golden/` | a synthetic picture, what the reference inference makes of it, a frame of our renderer (`people.jpg`), COCO scoring cases: for tests |
 
@@ -89,6 +90,9 @@ Held-out pictures drawn by people (`val.json`, {c['images']} images):
 | the found ones' mean mask IoU | {c['near_person_mean_iou']:.3f} | 0.80 |
 | person box AP50 | {c['person_bbox_ap50']:.3f} | |
 | all classes, mask AP50 / AP | {c['all_segm_ap50']:.3f} / {c['all_segm_ap']:.3f} | |
+
+In eight bits at 512x384, as processors without 16-bit floats run it: AP50 {s['coco_int8_512']['person_segm_ap50']:.3f}, pixel IoU {s['coco_int8_512']['person_pixel_iou']:.3f}, near persons found {s['coco_int8_512']['near_person_recall']:.3f} with a
+mean IoU of {s['coco_int8_512']['near_person_mean_iou']:.3f}.
 
 Composed RGB-D sequences (real room, cut-out actors), person pixels, medians over frames:
 

@@ -44,13 +44,14 @@ class Torch:
         return {"masks": self.call(2, x).numpy()}
 
 
-def open_model(path, size, threads=2):
+def open_model(path, size, int8=False, threads=2):
+    size = tuple(int(v) for v in size.split("x")) if size else None
     if path.endswith(".pt"):
-        t = Torch(path, size)
+        t = Torch(path, size or (480, 640))
         return infer.Segmenter(t), t.names
     with open(os.path.join(path, "model.json")) as f:
         m = json.load(f)
-    graphs = infer.OpenVino(path, threads, trunk=m["trunk"], box=m["box"], mask=m["mask"])
+    graphs = infer.OpenVino(path, threads, trunk=m["trunk_int8" if int8 else "trunk"], box=m["box"], mask=m["mask"], size=size)
     return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"]), m["classes"]
 
 
@@ -156,10 +157,11 @@ def main():
     a.add_argument("--sequence", nargs="*", default=[])
     a.add_argument("--step", type=int, default=5, help="every so many frames of a sequence")
     a.add_argument("--score", type=float, default=0.5)
-    a.add_argument("--size", default="480x640", help="for a check point")
+    a.add_argument("--size", help="of the network's input, height x width; default: as exported, 480x640 for a check point")
+    a.add_argument("--int8", action="store_true", help="the trunk in INT8")
     a.add_argument("--json")
     o = a.parse_args()
-    seg, names = open_model(o.model, tuple(int(v) for v in o.size.split("x")))
+    seg, names = open_model(o.model, o.size, o.int8)
     out = {"model": os.path.basename(os.path.normpath(o.model))}
     if o.coco:
         out["coco"] = score_coco(seg, names, *o.coco, o.score)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Check point -> three ONNX graphs (trunk, box head, mask head), model.json, and INT8 forms where wanted.
+"""Check point -> three ONNX graphs (trunk, box head, mask head), model.json, and the trunk in INT8 where wanted.
 
 usage: export.py CHECKPOINT OUT_DIR [--size 480x640] [--int8 COCO_JSON IMAGES]
 """
@@ -64,6 +64,7 @@ class Mask(nn.Module):
         return self.head(rois.permute(0, 3, 1, 2)).sigmoid()
 
 
+TRUNK_INT8 = "trunk.int8.xml"       # its weights are beside it in trunk.int8.bin
 TRUNK_OUT = ["p3", "p4", "p5", "objectness3", "objectness4", "objectness5", "deltas3", "deltas4", "deltas5", "semantic"]
 
 
@@ -134,31 +135,30 @@ def calibration(json_path, images, size, most=200):
         yield np.ascontiguousarray(rgb.transpose(2, 0, 1)[None], np.float32) / 127.5 - 1
 
 
-def quantise(out, pictures, keep_float=()):
-    """INT8 graphs in OpenVINO's format beside the ONNX ones. Calibrates the heads on the ROIs of the pictures' proposals."""
+def quantise(out, pictures):
+    """The trunk in INT8, in OpenVINO's format, beside the ONNX one. The heads take too little time to be worth it."""
     import nncf
     import openvino as ov
+    m = ov.Core().read_model(os.path.join(out, "trunk.onnx"))
+    # The last 1x1 convolutions are cheap, and coarse steps in scores and box sizes cost accuracy.
+    last = [n.get_friendly_name() for n in m.get_ops() if n.get_type_name() == "Convolution"
+            and any(p in n.get_friendly_name() for p in ("objectness", "deltas", "semantic"))]
+    q = nncf.quantize(m, nncf.Dataset(pictures), subset_size=len(pictures), ignored_scope=nncf.IgnoredScope(names=last))
+    ov.save_model(q, os.path.join(out, TRUNK_INT8), compress_to_fp16=True)
 
-    import infer
-    core = ov.Core()
-    s = infer.Segmenter(infer.OpenVino(out, precision="f32"))
-    rois, mask_rois = [], []
-    for x in pictures[::4]:
-        t = s.g.trunk(x)
-        levels = [t["p3"][0].copy(), t["p4"][0].copy(), t["p5"][0].copy()]
-        prop = s.proposals(t)
-        rois.append(infer.roi_align(levels, prop, 7, infer.BOX_LEVELS))
-        mask_rois.append(infer.roi_align(levels, prop[:8], 14, infer.MASK_LEVELS))
-    for name, data in (("trunk", pictures), ("box", rois), ("mask", mask_rois)):
-        if name in keep_float:
-            continue
-        m = core.read_model(os.path.join(out, name + ".onnx"))
-        # The last 1x1 convolutions are cheap, and coarse steps in scores and box sizes cost accuracy.
-        last = [n.get_friendly_name() for n in m.get_ops() if n.get_type_name() == "Convolution"
-                and any(p in n.get_friendly_name() for p in ("objectness", "deltas", "semantic", "logits"))]
-        scope = nncf.IgnoredScope(names=last, validate=False) if last else None
-        q = nncf.quantize(m, nncf.Dataset(data), subset_size=len(data), ignored_scope=scope)
-        ov.save_model(q, os.path.join(out, name + ".int8.xml"), compress_to_fp16=True)
+
+def round_weights(path):
+    """Weights with the 10 bits of mantissa that float16 has: nobody can measure the rest, and files pack to half their size."""
+    import onnx
+    from onnx import numpy_helper
+    m = onnx.load(path)
+    for i in m.graph.initializer:
+        w = numpy_helper.to_array(i)
+        if w.dtype == np.float32:
+            bits = w.view(np.uint32).astype(np.uint64)
+            bits = (bits + 0x0FFF + ((bits >> 13) & 1)) & 0xFFFFE000          # to the nearest, ties to even
+            i.CopyFrom(numpy_helper.from_array(bits.astype(np.uint32).view(np.float32), i.name))
+    onnx.save(m, path)
 
 
 def sha(path):
@@ -166,9 +166,10 @@ def sha(path):
         return hashlib.sha256(f.read()).hexdigest()
 
 
-def about(net, state, out, size, trunk, box, mask):
+def about(net, state, out, size, int8):
     files = sorted(f for f in os.listdir(out) if f.endswith((".onnx", ".xml", ".bin")))
-    return {"format": 1, "name": "semvslam-maskrcnn-" + state["backbone"], "backbone": state["backbone"], "trunk": trunk, "box": box, "mask": mask,
+    return {"format": 1, "name": "semvslam-maskrcnn-" + state["backbone"], "backbone": state["backbone"],
+            "trunk": "trunk.onnx", "box": "box.onnx", "mask": "mask.onnx", **({"trunk_int8": TRUNK_INT8} if int8 else {}),
             "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
             "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
             "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
@@ -182,18 +183,17 @@ def main():
     a.add_argument("out")
     a.add_argument("--size", default="480x640")
     a.add_argument("--int8", nargs=2, metavar=("COCO_JSON", "IMAGES"))
-    a.add_argument("--keep-float", nargs="*", default=[], choices=("trunk", "box", "mask"))
     o = a.parse_args()
     os.makedirs(o.out, exist_ok=True)
     size = tuple(int(v) for v in o.size.split("x"))
     net, state = load(o.checkpoint)
     write_onnx(net, o.out, size)
-    names = {g: g + ".onnx" for g in ("trunk", "box", "mask")}
+    for name in ("trunk", "box", "mask"):
+        round_weights(os.path.join(o.out, name + ".onnx"))
     if o.int8:
-        quantise(o.out, list(calibration(*o.int8, size)), o.keep_float)
-        names = {g: n if g in o.keep_float else g + ".int8.xml" for g, n in names.items()}
+        quantise(o.out, list(calibration(*o.int8, size)))
     with open(os.path.join(o.out, "model.json"), "w") as f:
-        json.dump(about(net, state, o.out, size, **names), f, indent=1)
+        json.dump(about(net, state, o.out, size, bool(o.int8)), f, indent=1)
     print(json.dumps({f: os.path.getsize(os.path.join(o.out, f)) for f in sorted(os.listdir(o.out))}, indent=1))
 
 

@@ -136,15 +136,18 @@ def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share
 
 
 class OpenVino:
-    """The three exported graphs."""
+    """The three exported graphs. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
 
-    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx"):
+    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx", size=None):
         import openvino as ov
         core = ov.Core()
         options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1}
         if precision:
             options["INFERENCE_PRECISION_HINT"] = precision
-        self.graphs = [core.compile_model(os.path.join(folder, f), "CPU", options).create_infer_request() for f in (trunk, box, mask)]
+        models = [core.read_model(os.path.join(folder, f)) for f in (trunk, box, mask)]
+        if size:
+            models[0].reshape([1, 3, *size])
+        self.graphs = [core.compile_model(m, "CPU", options).create_infer_request() for m in models]
         self.size = tuple(self.graphs[0].get_compiled_model().input(0).shape)[2:]
 
     def run(self, graph, x):

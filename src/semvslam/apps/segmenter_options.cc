@@ -12,9 +12,14 @@ void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
   parser.add_option("--backend", options.backend, "auto, openvino or opencv")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "openvino", "opencv"}));
-  parser.add_option("--precision", options.precision, "auto or f32")
+  parser.add_option("--precision", options.precision, "auto, f32 or int8")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "f32"}));
+      ->check(CLI::IsMember({"auto", "f32", "int8"}));
+  parser
+      .add_option("--input-width", options.input_width_px,
+                  "of the image that the network sees, px; 0: by model and machine")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 4096));
 }
 
 }  // namespace semvslam

@@ -8,7 +8,8 @@ class App;
 
 namespace semvslam {
 
-/// The options that `segment`, `eval-seg` and `eval-repair` share: --model, --threads, --backend, --precision.
+/// The options that `segment`, `eval-seg` and `eval-repair` share: --model, --threads, --backend, --precision,
+/// --input-width.
 void add_segmenter_options(CLI::App& parser, SegmenterOptions& options);
 
 }  // namespace semvslam

@@ -29,7 +29,7 @@ class BadInput : public ::testing::TestWithParam<std::string> {
 
   /// A copy of the shipped network to be damaged.
   void copy_model() const {
-    for (const char* name : {"model.json", "trunk.onnx", "box.onnx", "mask.onnx"})
+    for (const char* name : {"model.json", "trunk.onnx", "box.onnx", "mask.onnx", "trunk.int8.xml", "trunk.int8.bin"})
       fs::copy_file(kModels / name, folder_ / name, fs::copy_options::overwrite_existing);
   }
   void edit_model(const std::function<void(nlohmann::json&)>& edit) const {
@@ -38,11 +38,11 @@ class BadInput : public ::testing::TestWithParam<std::string> {
     edit(model);
     std::ofstream(folder_ / "model.json") << model.dump();
   }
-  Result<std::unique_ptr<Segmenter>> make(const fs::path& model) const {
+  Result<std::unique_ptr<Segmenter>> make(const fs::path& model, const std::string& precision = "f32") const {
     SegmenterOptions options;
     options.model = model.string();
     options.backend = GetParam();
-    options.precision = "f32";
+    options.precision = precision;
     return make_segmenter(options, RoleTable());
   }
   const fs::path folder_ = fs::temp_directory_path() / ("bad_input_" + std::to_string(::getpid()));
@@ -58,6 +58,13 @@ TEST_P(BadInput, AModelThatIsMissingOrCutOffIsNamed) {
     const auto cut = make(folder_);
     ASSERT_FALSE(cut) << graph << " of " << bytes << " bytes";
     EXPECT_THAT(cut.error().message, HasSubstr(graph));
+  }
+  if (GetParam() == "openvino") {
+    copy_model();
+    fs::resize_file(folder_ / "trunk.int8.xml", 1000);
+    const auto cut = make(folder_, "int8");
+    ASSERT_FALSE(cut);
+    EXPECT_THAT(cut.error().message, HasSubstr("trunk.int8.xml"));
   }
   fs::remove(folder_ / "box.onnx");
   const auto missing = make(folder_);

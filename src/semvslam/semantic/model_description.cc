@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "semvslam/data/file_io.h"
@@ -31,6 +33,7 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.trunk = j.at("trunk").get<std::string>();
   m.box = j.at("box").get<std::string>();
   m.mask = j.at("mask").get<std::string>();
+  m.trunk_int8 = j.value("trunk_int8", "");
   m.input = {j.at("input").at("width").get<int>(), j.at("input").at("height").get<int>()};
   m.pad = j.at("input").at("pad").get<int>();
   m.classes = j.at("classes").get<std::vector<std::string>>();
@@ -74,6 +77,17 @@ Result<ModelDescription> ModelDescription::parse(const std::string& text, const 
   return m;
 }
 
+void ModelDescription::set_input_width(int width_px) {
+  const int step = strides.back();
+  const auto rounded = [step](double side_px) {
+    return std::max(1, static_cast<int>(std::lround(side_px / step))) * step;
+  };
+  const cv::Size before = input;
+  input.width = rounded(width_px);
+  input.height = rounded(static_cast<double>(input.width) * before.height / before.width);
+  gflops.trunk *= static_cast<double>(input.area()) / before.area();
+}
+
 Result<ModelDescription> ModelDescription::read(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "model.json";
   const Result<std::string> text = read_text_file(file);
@@ -83,8 +97,8 @@ Result<ModelDescription> ModelDescription::read(const std::filesystem::path& fol
                                                    file.string())};
   Result<ModelDescription> m = parse(*text, file.string());
   if (!m) return m;
-  for (const std::string& name : {m->trunk, m->box, m->mask})
-    if (!std::filesystem::is_regular_file(folder / name))
+  for (const std::string& name : {m->trunk, m->box, m->mask, m->trunk_int8})
+    if (!name.empty() && !std::filesystem::is_regular_file(folder / name))
       return Error{ErrorCode::kNotFound,
                    fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};
   return m;

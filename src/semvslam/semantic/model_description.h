@@ -15,6 +15,7 @@ struct ModelDescription {
   static constexpr int kLevels = 3;
 
   std::string name, trunk, box, mask;  // files beside model.json
+  std::string trunk_int8;              // the trunk in eight-bit numbers, for OpenVINO; empty = none
   cv::Size input;
   int pad = 127;  // value of the pixels that the image does not cover
   std::vector<std::string> classes;
@@ -33,6 +34,9 @@ struct ModelDescription {
     double of_image(int proposals, int masks) const { return trunk + proposals * box_region + masks * mask_region; }
   } gflops;
 
+  /// The network shall see images of another size: as wide as that, or nearly (sides are multiples of the coarsest
+  /// stride), in the same shape. @param width_px 32 to 4096.
+  void set_input_width(int width_px);
   int anchors_per_cell() const { return static_cast<int>(anchor_sizes[0].size() * anchor_ratios.size()); }
 
   /// Errors: no JSON, a key missing or out of range. @param origin for messages.

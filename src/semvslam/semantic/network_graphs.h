@@ -52,7 +52,8 @@ class NetworkGraphs {
 
 /// Errors: a graph that cannot be read, or whose inputs and outputs differ from the description (the message names the
 /// tensor), or a build without OpenVINO (kUnsupported).
-/// @param precision "auto" (the fastest type of the machine) or "f32".
+/// @param precision "auto" (the float graphs in the fastest type of the machine), "f32", or "int8": the trunk in eight
+/// bits, which a model may lack (kInvalidInput). The trunk takes images of model.input, whatever it was exported for.
 Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
                                                             const ModelDescription& model, const std::string& precision,
                                                             int threads);
@@ -60,5 +61,8 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder,
                                                           const ModelDescription& model);
 bool have_openvino();
+/// Whether this processor computes in sixteen-bit floats, which double the speed of float graphs; false without
+/// OpenVINO.
+bool has_short_floats();
 
 }  // namespace semvslam

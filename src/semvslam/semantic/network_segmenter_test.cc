@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
 
 namespace semvslam {
 namespace {
@@ -144,6 +145,20 @@ TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {
   EXPECT_NEAR(model->gflops.of_image(NetworkGraphs::kBoxBatch, 5), 6.55, 0.01);  // training/table2.py
 }
 
+TEST(ModelDescription, AnotherWidthKeepsTheShapeOfTheInput) {
+  Result<ModelDescription> model = ModelDescription::read(kModels);
+  ASSERT_TRUE(model) << model.error().message;
+  const double gflops = model->gflops.trunk;
+  ASSERT_EQ(model->input, cv::Size(640, 480));
+  model->set_input_width(512);
+  EXPECT_EQ(model->input, cv::Size(512, 384));
+  EXPECT_NEAR(model->gflops.trunk, 0.64 * gflops, 1e-9);
+  model->set_input_width(570);  // sides are multiples of 32
+  EXPECT_EQ(model->input, cv::Size(576, 448));
+  model->set_input_width(1);
+  EXPECT_EQ(model->input, cv::Size(32, 32));
+}
+
 /// The shipped network; these need OpenVINO.
 class ShippedNetwork : public ::testing::Test {
  protected:
@@ -224,6 +239,47 @@ TEST_F(ShippedNetwork, OpenCvFindsTheSame) {
   const cv::Mat persons_a = a->mask_of_class("person"), persons_b = b->mask_of_class("person");
   EXPECT_GT(cv::countNonZero(persons_b), 1000);
   EXPECT_LT(cv::countNonZero(persons_a != persons_b), 0.01 * cv::countNonZero(persons_b));
+}
+
+TEST_F(ShippedNetwork, PersonsAreFoundAtOtherWidthsAndInEightBits) {
+  const cv::Mat picture = cv::imread((kModels / "golden" / "people.jpg").string());
+  SegmenterOptions options;
+  options.model = kModels.string();
+  options.backend = "openvino";
+  options.precision = "f32";
+  const auto persons = [&] {
+    const auto segmenter = make_segmenter(options, RoleTable());
+    if (!segmenter) throw std::runtime_error(segmenter.error().message);
+    const auto s = (*segmenter)->segment(request(picture));
+    if (!s) throw std::runtime_error(s.error().message);
+    return s->mask_of_class("person");
+  };
+  const auto overlap = [](const cv::Mat& a, const cv::Mat& b) {
+    return static_cast<double>(cv::countNonZero(a & b)) / cv::countNonZero(a | b);
+  };
+  const cv::Mat reference = persons();
+  ASSERT_GT(cv::countNonZero(reference), 1000);
+  options.input_width_px = 512;
+  EXPECT_GT(overlap(persons(), reference), 0.8);
+  options.input_width_px = 768;
+  EXPECT_GT(overlap(persons(), reference), 0.8);
+  options.input_width_px = 0;
+  options.precision = "int8";
+  EXPECT_GT(overlap(persons(), reference), 0.9);
+  options.backend = "opencv";
+  const auto refused = make_segmenter(options, RoleTable());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
+}
+
+TEST_F(ShippedNetwork, EightBitsThatTheModelLacksAreAnError) {
+  Result<ModelDescription> model = ModelDescription::read(kModels);
+  ASSERT_TRUE(model);
+  model->trunk_int8.clear();
+  const auto graphs = make_openvino_graphs(kModels, *model, "int8", 1);
+  ASSERT_FALSE(graphs);
+  EXPECT_EQ(graphs.error().code, ErrorCode::kInvalidInput);
+  EXPECT_THAT(graphs.error().message, HasSubstr("trunk_int8"));
 }
 
 TEST_F(ShippedNetwork, AWrongGraphIsNamed) {

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <openvino/openvino.hpp>
 
 namespace semvslam {
@@ -16,6 +17,11 @@ using Shape = std::vector<std::size_t>;
 struct WrongTensor : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+ov::Core& core() {
+  static ov::Core shared;  // its plugins stay loaded
+  return shared;
+}
 
 std::size_t count(const Shape& shape) {
   std::size_t n = 1;
@@ -30,7 +36,13 @@ class OpenVinoGraphs final : public NetworkGraphs {
       : model_(model) {
     ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(threads), ov::hint::enable_cpu_pinning(false)};
     if (precision == "f32") options.insert(ov::hint::inference_precision(ov::element::f32));
-    load_trunk(folder / model.trunk, options);
+    if (precision == "int8" && model.trunk_int8.empty())
+      throw WrongTensor(
+          fmt::format("{}: has no eight-bit trunk ('trunk_int8' in model.json); take precision auto or "
+                      "f32, or export it with --int8",
+                      folder.string()));
+    trunk_name_ = precision == "int8" ? model.trunk_int8 : model.trunk;
+    load_trunk(folder / trunk_name_, options);
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
     const auto c = static_cast<std::size_t>(model.channels);
@@ -69,7 +81,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
   }
 
   std::string description() const override {
-    return fmt::format("{} by OpenVINO {}", model_.name, ov::get_openvino_version().buildNumber);
+    return fmt::format("{} ({}, {}x{}) by OpenVINO {}", model_.name, trunk_name_, model_.input.width,
+                       model_.input.height, ov::get_openvino_version().buildNumber);
   }
 
  private:
@@ -83,31 +96,28 @@ class OpenVinoGraphs final : public NetworkGraphs {
     return Status::success();
   }
 
-  static ov::Core& core() {
-    static ov::Core shared;  // its plugins stay loaded
-    return shared;
-  }
-
   static std::shared_ptr<ov::Model> read(const std::filesystem::path& file) { return core().read_model(file.string()); }
 
   static ov::CompiledModel compile(const std::shared_ptr<ov::Model>& m, const ov::AnyMap& options) {
     return core().compile_model(m, "CPU", options);
   }
 
-  static void check_input(const std::shared_ptr<ov::Model>& m, const std::string& name, const Shape& wanted) {
+  static void check_input(const std::shared_ptr<ov::Model>& m, const std::string& name,
+                          const ov::PartialShape& wanted) {
     if (m->inputs().size() != 1 || m->input().get_names().count(name) == 0)
       throw WrongTensor(fmt::format("expected one input, named '{}'", name));
     const ov::PartialShape shape = m->input().get_partial_shape();
-    if (!shape.compatible(ov::PartialShape(ov::Shape(wanted))))
+    if (!shape.compatible(wanted))
       throw WrongTensor(
-          fmt::format("input '{}' has the shape {}, expected [{}]", name, shape.to_string(), fmt::join(wanted, ",")));
+          fmt::format("input '{}' has the shape {}, expected {}", name, shape.to_string(), wanted.to_string()));
   }
 
   void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
     try {
       const std::shared_ptr<ov::Model> m = read(file);
       const auto h = static_cast<std::size_t>(model_.input.height), w = static_cast<std::size_t>(model_.input.width);
-      check_input(m, "image", {1, 3, h, w});
+      check_input(m, "image", {1, 3, ov::Dimension::dynamic(), ov::Dimension::dynamic()});
+      m->reshape(ov::PartialShape(ov::Shape{1, 3, h, w}));
       ov::preprocess::PrePostProcessor p(m);
       p.input()
           .tensor()
@@ -130,7 +140,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
       const int stride = model_.strides[l], rows = model_.input.height / stride, columns = model_.input.width / stride;
       const auto r = static_cast<std::size_t>(rows), c = static_cast<std::size_t>(columns);
       const auto part = [&](const char* name, std::size_t channels) {
-        return output(trunk_, model_.trunk, fmt::format("{}{}", name, l + 3), {1, r, c, channels});
+        return output(trunk_, trunk_name_, fmt::format("{}{}", name, l + 3), {1, r, c, channels});
       };
       trunk_out_.levels[l].features = {part("p", static_cast<std::size_t>(model_.channels)).data(), rows, columns,
                                        stride};
@@ -139,13 +149,13 @@ class OpenVinoGraphs final : public NetworkGraphs {
     }
     const auto r = static_cast<std::size_t>(model_.input.height / model_.strides[0]),
                c = static_cast<std::size_t>(model_.input.width / model_.strides[0]);
-    trunk_out_.semantic = output(trunk_, model_.trunk, "semantic", {1, r, c, TrunkOutput::kSemanticChannels});
+    trunk_out_.semantic = output(trunk_, trunk_name_, "semantic", {1, r, c, TrunkOutput::kSemanticChannels});
   }
 
   static ov::InferRequest load_head(const std::filesystem::path& file, const Shape& shape, const ov::AnyMap& options) {
     try {
       const std::shared_ptr<ov::Model> m = read(file);
-      check_input(m, "rois", shape);
+      check_input(m, "rois", ov::PartialShape(ov::Shape(shape)));
       m->reshape(ov::PartialShape(ov::Shape(shape)));
       return compile(m, options).create_infer_request();
     } catch (const std::exception& e) {
@@ -175,6 +185,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
   }
 
   ModelDescription model_;
+  std::string trunk_name_;
   ov::InferRequest trunk_, box_, mask_;
   TrunkOutput trunk_out_;
   std::span<const float> probabilities_, box_deltas_, masks_;
@@ -194,6 +205,15 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 
 bool have_openvino() { return true; }
 
+bool has_short_floats() {
+  try {
+    const auto types = core().get_property("CPU", ov::device::capabilities);
+    return std::any_of(types.begin(), types.end(), [](const std::string& t) { return t == "BF16" || t == "FP16"; });
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
 }  // namespace semvslam
 
 #else
@@ -206,6 +226,7 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 }
 
 bool have_openvino() { return false; }
+bool has_short_floats() { return false; }
 
 }  // namespace semvslam
 

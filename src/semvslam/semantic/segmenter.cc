@@ -22,6 +22,23 @@ class NoSegmenter final : public Segmenter {
   std::vector<std::string> names_;
 };
 
+constexpr double kSlowMachineWidth = 0.8;  // of the model's input: two thirds of the time; persons near by lose nothing
+
+/// Number type and size of the input that suit the machine, where the options leave them open. @return the precision.
+std::string settle(const SegmenterOptions& options, bool openvino, ModelDescription& model) {
+  std::string precision = options.precision;
+  bool slow = false;
+  if (openvino && precision == "auto" && !has_short_floats()) {
+    slow = true;
+    precision = model.trunk_int8.empty() ? "f32" : "int8";
+  }
+  if (options.input_width_px > 0)
+    model.set_input_width(options.input_width_px);
+  else if (slow)
+    model.set_input_width(static_cast<int>(kSlowMachineWidth * model.input.width));
+  return precision;
+}
+
 Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options, const RoleTable& roles,
                                                 StageTimers* timers) {
   const Result<std::filesystem::path> folder =
@@ -30,8 +47,13 @@ Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options,
   Result<ModelDescription> model = ModelDescription::read(*folder);
   if (!model) return model.error();
   const bool openvino = options.backend == "openvino" || (options.backend == "auto" && have_openvino());
+  if (!openvino && (options.input_width_px > 0 || options.precision == "int8"))
+    return Error{ErrorCode::kUnsupported,
+                 "segment.input_width_px and segment.precision=int8 need OpenVINO; OpenCV runs the network as it was "
+                 "exported"};
+  const std::string precision = settle(options, openvino, *model);
   Result<std::unique_ptr<NetworkGraphs>> graphs =
-      openvino ? make_openvino_graphs(*folder, *model, options.precision, options.threads)
+      openvino ? make_openvino_graphs(*folder, *model, precision, options.threads)
                : make_opencv_graphs(*folder, *model);
   if (!graphs) return graphs.error();
   NetworkSegmenter::Limits limits;
@@ -46,8 +68,12 @@ void SegmenterOptions::add_to(ConfigSchema& schema) {
   schema.add("segment.source", &source, {"network", "folder", "none"}, "where masks come from");
   schema.add("segment.model", &model, {}, "folder with the network's model.json; empty = the one that comes with it");
   schema.add("segment.backend", &backend, {"auto", "openvino", "opencv"}, "library that runs the network");
-  schema.add("segment.precision", &precision, {"auto", "f32"},
-             "auto = fastest type of this machine, f32 = alike everywhere");
+  schema.add("segment.precision", &precision, {"auto", "f32", "int8"},
+             "auto = fastest type of this machine, f32 = alike everywhere, int8 = eight bits where the model has them");
+  schema.add(
+      "segment.input_width_px", &input_width_px, {0, 4096},
+      "width of the image that the network sees: more finds smaller persons, less is faster; 0 = the model's, or "
+      "four fifths of it on processors without 16-bit floats, px");
   schema.add("segment.mask_folder", &mask_folder, {}, "folder of masks (PNG), for source = folder");
   schema.add("segment.score", &score, {0.01, 1.0}, "least score of an object");
   schema.add("segment.threads", &threads, {1, 64}, "threads of the network");

@@ -44,7 +44,8 @@ struct SegmenterOptions {
   std::string source = "network";  // network, folder, none
   std::string model;               // folder of the network's model.json; empty: the one that comes with semvslam
   std::string backend = "auto";    // auto, openvino, opencv
-  std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere
+  std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere; int8: eight bits
+  int input_width_px = 0;          // of the image that the network sees; 0 = by model and machine
   std::string mask_folder;         // of source `folder`
   double score = 0.6;              // least score of an instance
   int threads = 2;                 // of the network
