@@ -37,9 +37,11 @@ target_link_libraries(semvslam_openvino INTERFACE -l:${SEMVSLAM_OPENVINO_LIBRARY
 target_link_options(semvslam_openvino INTERFACE -L${SEMVSLAM_OPENVINO_FOLDER})
 list(APPEND CMAKE_BUILD_RPATH ${SEMVSLAM_OPENVINO_FOLDER})
 
-# The installed program brings the part of OpenVINO along that it uses.
+# The installed program brings the part of OpenVINO along that it uses: the readers of both forms of models/ (ONNX, and
+# OpenVINO's own for the eight-bit trunk), the processor's plug-in and what they load.
 set(SEMVSLAM_INSTALL_RPATH $ORIGIN/../${SEMVSLAM_OPENVINO_INSTALLED})
 file(GLOB libraries ${library} ${SEMVSLAM_OPENVINO_FOLDER}/libopenvino_intel_cpu_plugin.so
      ${SEMVSLAM_OPENVINO_FOLDER}/libopenvino_arm_cpu_plugin.so ${SEMVSLAM_OPENVINO_FOLDER}/libopenvino_onnx_frontend.so.*
-     ${SEMVSLAM_OPENVINO_FOLDER}/libtbb*.so.* ${SEMVSLAM_OPENVINO_FOLDER}/libhwloc.so.*)
+     ${SEMVSLAM_OPENVINO_FOLDER}/libopenvino_ir_frontend.so.* ${SEMVSLAM_OPENVINO_FOLDER}/libtbb*.so.*
+     ${SEMVSLAM_OPENVINO_FOLDER}/libhwloc.so.*)
 install(FILES ${libraries} DESTINATION ${SEMVSLAM_OPENVINO_INSTALLED})
