@@ -31,7 +31,7 @@ MoverReach::MoverReach(const Camera& camera, const cv::Mat& depth, double reach_
     : grid_(camera, depth),
       fx_px_(camera.fx_px),
       reach_m_(reach_m),
-      inside_(grid_.size(), 0),
+      places_(grid_.size(), Place::kOutside),
       distances_m_(grid_.size(), std::numeric_limits<float>::infinity()) {}
 
 void MoverReach::add(const cv::Rect& window, const cv::Mat& mask, float depth_m) {
@@ -40,26 +40,60 @@ void MoverReach::add(const cv::Rect& window, const cv::Mat& mask, float depth_m)
   movers_.push_back(
       {cv::Rect(window.x - reach_px, window.y - reach_px, window.width + 2 * reach_px, window.height + 2 * reach_px),
        depth_m});
-  cv::Mat cells = cv::Mat::zeros(grid_.rows, grid_.columns, CV_8UC1), core;
-  for (int y = (window.y + kPx - 1) / kPx * kPx; y < window.br().y; y += kPx)
-    for (int x = (window.x + kPx - 1) / kPx * kPx; x < window.br().x; x += kPx)
-      cells.at<std::uint8_t>(y / kPx, x / kPx) = mask.at<std::uint8_t>(y - window.y, x - window.x);
+  // The window's cells and a ring about them, where the picture has one.
+  const cv::Rect cells = cv::Rect(cv::Point((window.x + kPx - 1) / kPx - 1, (window.y + kPx - 1) / kPx - 1),
+                                  cv::Point((window.br().x + kPx - 1) / kPx + 1, (window.br().y + kPx - 1) / kPx + 1)) &
+                         cv::Rect(0, 0, grid_.columns, grid_.rows);
+  cv::Mat covered = cv::Mat::zeros(cells.size(), CV_8UC1), core;
+  for (int r = 0; r < cells.height; ++r)
+    for (int c = 0; c < cells.width; ++c)
+      if (const cv::Point at((cells.x + c) * kPx, (cells.y + r) * kPx); window.contains(at))
+        covered.at<std::uint8_t>(r, c) = mask.at<std::uint8_t>(at - window.tl());
   // The rim of a mask may lie on what is behind it.
-  cv::erode(cells, core, cv::Mat(), {-1, -1}, 1, cv::BORDER_REPLICATE);
-  for (std::size_t cell = 0; cell < grid_.size(); ++cell) {
-    if (cells.data[cell] == 0) continue;
-    inside_[cell] = 1;
-    const float z = grid_.depth_m[cell];
-    if (core.data[cell] != 0 && z > 0 && std::abs(z - depth_m) < kBodyDepthM) cores_.push_back(static_cast<int>(cell));
-  }
+  cv::erode(covered, core, cv::Mat(), {-1, -1}, 1, cv::BORDER_REPLICATE);
+  for (int r = 0; r < cells.height; ++r)
+    for (int c = 0; c < cells.width; ++c) {
+      if (covered.at<std::uint8_t>(r, c) == 0) continue;
+      const int cell = (cells.y + r) * grid_.columns + cells.x + c;
+      const float z = grid_.depth_m[static_cast<std::size_t>(cell)];
+      const bool from = core.at<std::uint8_t>(r, c) != 0 && z > 0 && std::abs(z - depth_m) < kBodyDepthM;
+      Place& place = places_[static_cast<std::size_t>(cell)];
+      if (from && place != Place::kCore) cores_.push_back(cell);
+      place = std::max(place, from ? Place::kCore : Place::kInside);
+    }
 }
 
 void MoverReach::spread() {
   const float cell_share = static_cast<float>(kPx / fx_px_);  // width of a cell, share of its depth
   std::vector<std::vector<Front>> open(static_cast<std::size_t>(reach_m_ / kBucketM) + 2);
+  for (const int cell : cores_) distances_m_[static_cast<std::size_t>(cell)] = 0;
+  const auto go_on = [&](const Front& at) {
+    const int c = at.cell % grid_.columns, r = at.cell / grid_.columns;
+    for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+      if (c + dc < 0 || r + dr < 0 || c + dc >= grid_.columns || r + dr >= grid_.rows) continue;
+      Front to = at;
+      to.cell += dr * grid_.columns + dc;
+      const auto next = static_cast<std::size_t>(to.cell);
+      if (distances_m_[next] <= at.distance_m) continue;
+      const bool inside = places_[next] != Place::kOutside;
+      const float z = grid_.depth_m[next];
+      if (z > 0) {
+        const float step = kStepShare * static_cast<float>(1 + at.hole);  // a hole may hide a slope
+        if (std::abs(z - at.depth_m) > step * std::max(z, 1.f)) continue;
+        if (inside) to.origin_depth_m = z;
+        if (std::abs(z - to.origin_depth_m) > kLimbDepthM) continue;
+        to.depth_m = z;
+        to.hole = 0;
+      } else if (++to.hole > kLongestHole) {
+        continue;
+      }
+      if (!inside) to.distance_m += std::hypot(cell_share * to.depth_m, to.depth_m - at.depth_m);
+      if (to.distance_m <= reach_m_) open[static_cast<std::size_t>(to.distance_m / kBucketM)].push_back(to);
+    }
+  };
   for (const int cell : cores_) {
     const float z = grid_.depth_m[static_cast<std::size_t>(cell)];
-    open[0].push_back({cell, z, z, 0, 0});
+    go_on({cell, z, z, 0, 0});
   }
   for (std::size_t bucket = 0; bucket < open.size(); ++bucket)
     for (std::size_t next = 0; next < open[bucket].size(); ++next) {
@@ -67,26 +101,7 @@ void MoverReach::spread() {
       float& distance_m = distances_m_[static_cast<std::size_t>(at.cell)];
       if (distance_m <= at.distance_m) continue;
       distance_m = at.distance_m;
-      const int c = at.cell % grid_.columns, r = at.cell / grid_.columns;
-      for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-        if (c + dc < 0 || r + dr < 0 || c + dc >= grid_.columns || r + dr >= grid_.rows) continue;
-        Front to = at;
-        to.cell += dr * grid_.columns + dc;
-        const bool inside = inside_[static_cast<std::size_t>(to.cell)] != 0;
-        const float z = grid_.depth_m[static_cast<std::size_t>(to.cell)];
-        if (z > 0) {
-          const float step = kStepShare * static_cast<float>(1 + at.hole);  // a hole may hide a slope
-          if (std::abs(z - at.depth_m) > step * std::max(z, 1.f)) continue;
-          if (inside) to.origin_depth_m = z;
-          if (std::abs(z - to.origin_depth_m) > kLimbDepthM) continue;
-          to.depth_m = z;
-          to.hole = 0;
-        } else if (++to.hole > kLongestHole) {
-          continue;
-        }
-        if (!inside) to.distance_m += std::hypot(cell_share * to.depth_m, to.depth_m - at.depth_m);
-        if (to.distance_m <= reach_m_) open[static_cast<std::size_t>(to.distance_m / kBucketM)].push_back(to);
-      }
+      go_on(at);
     }
 }
 

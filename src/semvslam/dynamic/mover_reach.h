@@ -40,9 +40,10 @@ class MoverReach {
   CellGrid grid_;
   double fx_px_, reach_m_;
   std::vector<Mover> movers_;
-  std::vector<std::uint8_t> inside_;  // per cell: in a mask
-  std::vector<int> cores_;            // cells that distances are measured from
-  std::vector<float> distances_m_;    // per cell
+  enum class Place : std::uint8_t { kOutside, kInside, kCore };  // of the masks
+  std::vector<Place> places_;                                    // per cell
+  std::vector<int> cores_;                                       // cells that distances are measured from
+  std::vector<float> distances_m_;                               // per cell
 };
 
 }  // namespace semvslam

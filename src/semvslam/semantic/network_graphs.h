@@ -36,7 +36,7 @@ struct BoxHeadOutput {
 class NetworkGraphs {
  public:
   static constexpr int kBoxBatch = 100, kBoxCells = 7;  // regions of one call of the box head; cells along an edge
-  static constexpr int kMaskBatch = 4, kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
+  static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
 
   virtual ~NetworkGraphs() = default;
   /// @param image CV_8UC3 BGR of the model's input size.
@@ -44,7 +44,7 @@ class NetworkGraphs {
   /// Where the features of kBoxBatch regions are to be written before box_head().
   virtual std::span<float> box_input() = 0;
   virtual Result<BoxHeadOutput> box_head() = 0;
-  /// The same for kMaskBatch regions. @return kMaskChannels x kMaskSide x kMaskSide probabilities per region.
+  /// The same for one region: an image has few. @return kMaskChannels x kMaskSide x kMaskSide probabilities.
   virtual std::span<float> mask_input() = 0;
   virtual Result<std::span<const float>> mask_head() = 0;
   virtual std::string description() const = 0;

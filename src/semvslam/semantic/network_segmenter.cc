@@ -137,38 +137,30 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
   const SemanticHint hint{trunk.semantic.data(), finest.rows,      finest.columns,       TrunkOutput::kSemanticChannels,
                           scale_x / stride,      scale_y / stride, model_.semantic_share};
   const std::span<float> input = graphs_->mask_input();
-  const std::size_t region = input.size() / NetworkGraphs::kMaskBatch;
   constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
-  for (std::size_t first = 0; first < objects.size(); first += NetworkGraphs::kMaskBatch) {
-    const std::size_t n = std::min<std::size_t>(NetworkGraphs::kMaskBatch, objects.size() - first);
-    for (std::size_t k = 0; k < n; ++k)
-      align_region(trunk, objects[first + k].box, model_.mask_levels, NetworkGraphs::kMaskCells, &input[k * region]);
-    std::fill(input.begin() + static_cast<std::ptrdiff_t>(n * region), input.end(), 0.f);
+  for (const Object& o : objects) {
+    align_region(trunk, o.box, model_.mask_levels, NetworkGraphs::kMaskCells, input.data());
     const Result<std::span<const float>> masks = graphs_->mask_head();
     if (!masks) return masks.error();
-    for (std::size_t k = 0; k < n; ++k) {
-      const Object& o = objects[first + k];
-      const std::size_t channel = o.class_index == 0 ? 0 : 1;  // persons have a channel of their own
-      const std::span<const float> mask =
-          masks->subspan((k * NetworkGraphs::kMaskChannels + channel) * kPixels, kPixels);
-      if (!finite(mask)) return not_finite("masks");
-      const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
-                             std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
-      const bool person = o.class_index == 0;
-      PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
-                                     person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
-      const float score = person ? std::sqrt(o.score * pasted.support) : o.score;
-      if (!(score >= limits_.score) || pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
-      Instance i;
-      i.class_index = o.class_index;
-      i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
-      i.role = roles_.role(i.class_name);
-      i.score = score;
-      i.box = {box.x0, box.y0, box.width(), box.height()};
-      i.window = pasted.window;
-      i.mask = pasted.mask;
-      out.instances.push_back(std::move(i));
-    }
+    const bool person = o.class_index == 0;
+    const std::span<const float> mask =
+        masks->subspan(person ? 0 : kPixels, kPixels);  // persons have a channel of their own
+    if (!finite(mask)) return not_finite("masks");
+    const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
+                           std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
+    PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
+                                   person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
+    const float score = person ? std::sqrt(o.score * pasted.support) : o.score;
+    if (!(score >= limits_.score) || pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
+    Instance i;
+    i.class_index = o.class_index;
+    i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
+    i.role = roles_.role(i.class_name);
+    i.score = score;
+    i.box = {box.x0, box.y0, box.width(), box.height()};
+    i.window = pasted.window;
+    i.mask = pasted.mask;
+    out.instances.push_back(std::move(i));
   }
   std::stable_sort(out.instances.begin(), out.instances.end(),
                    [](const Instance& a, const Instance& b) { return a.score > b.score; });

@@ -34,10 +34,10 @@ class FakeGraphs final : public NetworkGraphs {
     semantic_.assign(static_cast<std::size_t>(model.input.area()) / 64 * TrunkOutput::kSemanticChannels, 1.f);
     out_.semantic = semantic_;
     box_in_.resize(static_cast<std::size_t>(kBoxBatch) * kBoxCells * kBoxCells * model.channels);
-    mask_in_.resize(static_cast<std::size_t>(kMaskBatch) * kMaskCells * kMaskCells * model.channels);
+    mask_in_.resize(static_cast<std::size_t>(kMaskCells) * kMaskCells * model.channels);
     probabilities_.assign(kBoxBatch * (classes_ + 1), 0.f);
     deltas_.assign(kBoxBatch * 4, 0.f);
-    masks_.assign(static_cast<std::size_t>(kMaskBatch) * kMaskChannels * kMaskSide * kMaskSide, 1.f);
+    masks_.assign(static_cast<std::size_t>(kMaskChannels) * kMaskSide * kMaskSide, 1.f);
   }
   Result<TrunkOutput> trunk(const cv::Mat&) override { return out_; }
   std::span<float> box_input() override { return box_in_; }

@@ -16,7 +16,7 @@ class OpenCvGraphs final : public NetworkGraphs {
         box_(read(folder / model.box)),
         mask_(read(folder / model.mask)) {
     const int box_shape[] = {kBoxBatch, kBoxCells, kBoxCells, model.channels};
-    const int mask_shape[] = {kMaskBatch, kMaskCells, kMaskCells, model.channels};
+    const int mask_shape[] = {1, kMaskCells, kMaskCells, model.channels};
     box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
     mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
     // OpenCV knows the shapes for certain only once a graph has run; this also makes the first image as fast as the
@@ -70,7 +70,7 @@ class OpenCvGraphs final : public NetworkGraphs {
     return guarded<std::span<const float>>([&] {
       mask_.setInput(mask_in_);
       mask_out_ = mask_.forward("masks");
-      return numbers(mask_out_, static_cast<std::size_t>(kMaskBatch) * kMaskChannels * kMaskSide * kMaskSide, "masks");
+      return numbers(mask_out_, static_cast<std::size_t>(kMaskChannels) * kMaskSide * kMaskSide, "masks");
     });
   }
 

@@ -49,8 +49,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
     box_ = load_head(folder / model.box, {kBoxBatch, kBoxCells, kBoxCells, c}, options);
     probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
     box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
-    mask_ = load_head(folder / model.mask, {kMaskBatch, kMaskCells, kMaskCells, c}, options);
-    masks_ = output(mask_, model.mask, "masks", {kMaskBatch, kMaskChannels, kMaskSide, kMaskSide});
+    mask_ = load_head(folder / model.mask, {1, kMaskCells, kMaskCells, c}, options);
+    masks_ = output(mask_, model.mask, "masks", {1, kMaskChannels, kMaskSide, kMaskSide});
   }
 
   Result<TrunkOutput> trunk(const cv::Mat& image) override {
