@@ -15,7 +15,7 @@ constexpr float kLimbDepthM = 0.3f;   // nor a limb from the place where it leav
 constexpr float kStepShare = 0.025f;  // of the depth: a larger step between neighbours is an edge
 constexpr float kEdgeShare = 0.05f;   // the same between any two of the cells around a place
 constexpr int kLongestHole = 4;       // cells without depth that a surface may go on behind
-constexpr double kBucketM = 0.01;     // distances are told apart to that
+constexpr float kBucketsPerM = 100;   // distances are told apart to a centimetre
 
 struct Front {
   int cell;
@@ -65,18 +65,23 @@ void MoverReach::add(const cv::Rect& window, const cv::Mat& mask, float depth_m)
 
 void MoverReach::spread() {
   const float cell_share = static_cast<float>(kPx / fx_px_);  // width of a cell, share of its depth
-  std::vector<std::vector<Front>> open(static_cast<std::size_t>(reach_m_ / kBucketM) + 2);
-  for (const int cell : cores_) distances_m_[static_cast<std::size_t>(cell)] = 0;
-  const auto go_on = [&](const Front& at) {
-    const int c = at.cell % grid_.columns, r = at.cell / grid_.columns;
+  const auto reach_m = static_cast<float>(reach_m_);
+  const int columns = grid_.columns, rows = grid_.rows;
+  const Place* const places = places_.data();
+  const float* const depths_m = grid_.depth_m.data();
+  float* const distances_m = distances_m_.data();
+  std::vector<std::vector<Front>> open(static_cast<std::size_t>(reach_m * kBucketsPerM) + 2);
+  for (const int cell : cores_) distances_m[cell] = 0;
+  const auto go_on = [=, &open](const Front& at) {
+    const int c = at.cell % columns, r = at.cell / columns;
     for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      if (c + dc < 0 || r + dr < 0 || c + dc >= grid_.columns || r + dr >= grid_.rows) continue;
+      if (c + dc < 0 || r + dr < 0 || c + dc >= columns || r + dr >= rows) continue;
+      const int cell = at.cell + dr * columns + dc;
+      if (distances_m[cell] <= at.distance_m) continue;
       Front to = at;
-      to.cell += dr * grid_.columns + dc;
-      const auto next = static_cast<std::size_t>(to.cell);
-      if (distances_m_[next] <= at.distance_m) continue;
-      const bool inside = places_[next] != Place::kOutside;
-      const float z = grid_.depth_m[next];
+      to.cell = cell;
+      const bool inside = places[cell] != Place::kOutside;
+      const float z = depths_m[cell];
       if (z > 0) {
         const float step = kStepShare * static_cast<float>(1 + at.hole);  // a hole may hide a slope
         if (std::abs(z - at.depth_m) > step * std::max(z, 1.f)) continue;
@@ -87,20 +92,23 @@ void MoverReach::spread() {
       } else if (++to.hole > kLongestHole) {
         continue;
       }
-      if (!inside) to.distance_m += std::hypot(cell_share * to.depth_m, to.depth_m - at.depth_m);
-      if (to.distance_m <= reach_m_) open[static_cast<std::size_t>(to.distance_m / kBucketM)].push_back(to);
+      if (!inside) {
+        const float across_m = cell_share * to.depth_m, along_m = to.depth_m - at.depth_m;
+        to.distance_m += std::sqrt(across_m * across_m + along_m * along_m);
+      }
+      if (to.distance_m < distances_m[cell] && to.distance_m <= reach_m)
+        open[static_cast<std::size_t>(to.distance_m * kBucketsPerM)].push_back(to);
     }
   };
   for (const int cell : cores_) {
-    const float z = grid_.depth_m[static_cast<std::size_t>(cell)];
+    const float z = depths_m[cell];
     go_on({cell, z, z, 0, 0});
   }
   for (std::size_t bucket = 0; bucket < open.size(); ++bucket)
     for (std::size_t next = 0; next < open[bucket].size(); ++next) {
       const Front at = open[bucket][next];  // a copy: the bucket may grow
-      float& distance_m = distances_m_[static_cast<std::size_t>(at.cell)];
-      if (distance_m <= at.distance_m) continue;
-      distance_m = at.distance_m;
+      if (distances_m[at.cell] <= at.distance_m) continue;
+      distances_m[at.cell] = at.distance_m;
       go_on(at);
     }
 }

@@ -20,26 +20,30 @@ constexpr int kProducts = kSize + 4;               // rows of gradient products 
 using Ints = std::int32_t __attribute__((vector_size(4 * kLanes)));
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 
-Ints load(const std::array<std::int32_t, kLanes>& from) {
+Ints load(const std::int32_t* from) {
   Ints v;
-  std::memcpy(&v, from.data(), sizeof v);
+  std::memcpy(&v, from, sizeof v);
   return v;
 }
 
-Ints next(const Ints& v) { return __builtin_shufflevector(v, v, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 0); }
-
-/// Sums of three neighbours of sums of three neighbours: the window (1 2 3 2 1) in both directions.
+/// Sums of three neighbours of sums of three neighbours: the window (1 2 3 2 1) in both directions. The last four lanes
+/// say nothing.
 void sum_windows(const std::array<std::array<std::int32_t, kLanes>, kProducts>& products,
                  std::array<Ints, kSize>& sums) {
   std::array<Ints, kProducts - 2> three;
   for (std::size_t r = 0; r < three.size(); ++r)
-    three[r] = load(products[r]) + load(products[r + 1]) + load(products[r + 2]);
+    three[r] = load(products[r].data()) + load(products[r + 1].data()) + load(products[r + 2].data());
+  // Neighbouring lanes are read from memory: GCC 12 moves the lanes of vectors wider than a register one at a time. All
+  // rows are written before the first is read, since a read across two writes waits until they are done.
+  alignas(64) std::array<std::int32_t, kSize * kLanes + kLanes> columns{};
   for (std::size_t r = 0; r < sums.size(); ++r) {
     const Ints column = three[r] + three[r + 1] + three[r + 2];
-    const Ints column1 = next(column);
-    const Ints row = column + column1 + next(column1);
-    const Ints row1 = next(row);
-    sums[r] = row + row1 + next(row1);
+    std::memcpy(&columns[r * kLanes], &column, sizeof column);
+  }
+  for (std::size_t r = 0; r < sums.size(); ++r) {
+    const std::int32_t* row = &columns[r * kLanes];
+    const Ints middle = load(row + 2), inner = load(row + 1) + load(row + 3), outer = load(row) + load(row + 4);
+    sums[r] = outer + inner + inner + middle + middle + middle;
   }
 }
 
