@@ -6,9 +6,9 @@ namespace semvslam {
 
 void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
   parser.add_option("--model", options.model, "folder with model.json (default: the network that comes along)");
-  parser.add_option("--threads", options.threads, "threads of the network")
+  parser.add_option("--threads", options.threads, "threads of the network; 0: by machine, as beside tracking")
       ->capture_default_str()
-      ->check(CLI::Range(1, 64));
+      ->check(CLI::Range(0, 64));
   parser.add_option("--backend", options.backend, "auto, openvino or opencv")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "openvino", "opencv"}));

@@ -207,7 +207,7 @@ TEST_F(ShippedNetwork, TheNumberOfThreadsDoesNotChangeTheResult) {
   const auto a = (*one)->segment(request(picture));
   ASSERT_TRUE(a);
   EXPECT_GE(a->instances.size(), 2u);  // enough to differ in
-  for (const int threads : {2, 3, 8}) {
+  for (const int threads : {0, 2, 3, 8}) {
     auto more = make(threads);
     ASSERT_TRUE(more);
     const auto b = (*more)->segment(request(picture));

@@ -24,19 +24,24 @@ class NoSegmenter final : public Segmenter {
 
 constexpr double kSlowMachineWidth = 0.8;  // of the model's input: two thirds of the time; persons near by lose nothing
 
-/// Number type and size of the input that suit the machine, where the options leave them open. @return the precision.
-std::string settle(const SegmenterOptions& options, bool openvino, ModelDescription& model) {
-  std::string precision = options.precision;
-  bool slow = false;
-  if (openvino && precision == "auto" && !has_short_floats()) {
-    slow = true;
-    precision = model.trunk_int8.empty() ? "f32" : "int8";
+struct Settled {
+  std::string precision;
+  int threads;
+};
+
+/// What suits the machine, where the options leave it open; the size of the model's input too.
+Settled settle(const SegmenterOptions& options, bool openvino, ModelDescription& model) {
+  // There the network is what all else waits for. Elsewhere a second thread, beside tracking and mapping, only waits.
+  const bool slow = openvino && !has_short_floats();
+  const int threads = options.threads > 0 ? options.threads : slow ? 2 : 1;
+  Settled out{options.precision, threads};
+  int width_px = options.input_width_px;
+  if (slow && options.precision == "auto") {
+    out.precision = model.trunk_int8.empty() ? "f32" : "int8";
+    if (width_px == 0) width_px = static_cast<int>(kSlowMachineWidth * model.input.width);
   }
-  if (options.input_width_px > 0)
-    model.set_input_width(options.input_width_px);
-  else if (slow)
-    model.set_input_width(static_cast<int>(kSlowMachineWidth * model.input.width));
-  return precision;
+  if (width_px > 0) model.set_input_width(width_px);
+  return out;
 }
 
 Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options, const RoleTable& roles,
@@ -51,9 +56,9 @@ Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options,
     return Error{ErrorCode::kUnsupported,
                  "segment.input_width_px and segment.precision=int8 need OpenVINO; OpenCV runs the network as it was "
                  "exported"};
-  const std::string precision = settle(options, openvino, *model);
+  const Settled settled = settle(options, openvino, *model);
   Result<std::unique_ptr<NetworkGraphs>> graphs =
-      openvino ? make_openvino_graphs(*folder, *model, precision, options.threads)
+      openvino ? make_openvino_graphs(*folder, *model, settled.precision, settled.threads)
                : make_opencv_graphs(*folder, *model);
   if (!graphs) return graphs.error();
   NetworkSegmenter::Limits limits;
@@ -76,7 +81,8 @@ void SegmenterOptions::add_to(ConfigSchema& schema) {
       "four fifths of it on processors without 16-bit floats, px");
   schema.add("segment.mask_folder", &mask_folder, {}, "folder of masks (PNG), for source = folder");
   schema.add("segment.score", &score, {0.01, 1.0}, "least score of an object");
-  schema.add("segment.threads", &threads, {1, 64}, "threads of the network");
+  schema.add("segment.threads", &threads, {0, 64},
+             "threads of the network; 0 = one, or two on processors without 16-bit floats");
 }
 
 Result<std::unique_ptr<Segmenter>> make_segmenter(const SegmenterOptions& options, const RoleTable& roles,

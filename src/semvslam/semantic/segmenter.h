@@ -48,7 +48,7 @@ struct SegmenterOptions {
   int input_width_px = 0;          // of the image that the network sees; 0 = by model and machine
   std::string mask_folder;         // of source `folder`
   double score = 0.6;              // least score of an instance
-  int threads = 2;                 // of the network
+  int threads = 2;                 // of the network; 0 = what suits the machine beside tracking
 
   void add_to(ConfigSchema& schema);
 };
