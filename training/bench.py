@@ -37,7 +37,7 @@ def main():
     with open(os.path.join(o.models, "model.json")) as f:
         m = json.load(f)
     files = {"trunk": m["trunk_int8" if o.int8 else "trunk"], "box": m["box"], "mask": m["mask"],
-             "size": tuple(int(v) for v in o.size.split("x")) if o.size else None}
+             "size": infer.size_of(o.size)}
     bgr = cv2.imread(o.image)
     for threads in o.threads:
         s = infer.Segmenter(infer.OpenVino(o.models, threads, o.precision, **files))

@@ -45,7 +45,7 @@ class Torch:
 
 
 def open_model(path, size, int8=False, threads=2):
-    size = tuple(int(v) for v in size.split("x")) if size else None
+    size = infer.size_of(size)
     if path.endswith(".pt"):
         t = Torch(path, size or (480, 640))
         return infer.Segmenter(t), t.names

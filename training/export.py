@@ -4,7 +4,6 @@
 usage: export.py CHECKPOINT OUT_DIR [--size 480x640] [--int8 COCO_JSON IMAGES]
 """
 import argparse
-import copy
 import hashlib
 import json
 import os
@@ -14,6 +13,7 @@ import torch
 from torch import nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
+import infer
 from segnet import boxes, cost, model
 
 
@@ -119,8 +119,6 @@ def bake_padding(path):
 def calibration(json_path, images, size, most=200):
     """Training pictures as the network sees them; every second one zoomed into, so that bodies of all sizes occur."""
     import cv2
-
-    import infer
     with open(json_path) as f:
         listed = json.load(f)["images"]
     rng = np.random.default_rng(0)
@@ -185,7 +183,7 @@ def main():
     a.add_argument("--int8", nargs=2, metavar=("COCO_JSON", "IMAGES"))
     o = a.parse_args()
     os.makedirs(o.out, exist_ok=True)
-    size = tuple(int(v) for v in o.size.split("x"))
+    size = infer.size_of(o.size)
     net, state = load(o.checkpoint)
     write_onnx(net, o.out, size)
     for name in ("trunk", "box", "mask"):

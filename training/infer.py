@@ -24,6 +24,11 @@ PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 
 
+def size_of(text):
+    """'480x640' -> (480, 640), height first; None of nothing."""
+    return tuple(int(v) for v in text.split("x")) if text else None
+
+
 def letterbox(bgr, size):
     """Resized to fit size (h, w), placed at the top left, grey elsewhere. Returns RGB uint8 and the two scales."""
     H, W = size

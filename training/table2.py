@@ -18,6 +18,7 @@ import numpy as np
 
 from segnet import backbones, cost, model
 import export
+import infer
 
 PROPOSALS, MASKS = 100, 5
 TRAINED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "models")
@@ -62,7 +63,7 @@ def main():
     a.add_argument("--no-time", action="store_true")
     a.add_argument("--json")
     o = a.parse_args()
-    size = tuple(int(v) for v in o.size.split("x"))
+    size = infer.size_of(o.size)
     trained, rows, timed = accuracy(), {}, {}
     for name in backbones.MAKERS:
         net = export.fuse(model.MaskRcnn(name).eval()).requires_grad_(False)

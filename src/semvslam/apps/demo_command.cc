@@ -10,6 +10,7 @@
 #include "semvslam/apps/command.h"
 #include "semvslam/apps/render_scene.h"
 #include "semvslam/apps/run_session.h"
+#include "semvslam/data/file_io.h"
 
 namespace semvslam {
 namespace fs = std::filesystem;
@@ -47,16 +48,10 @@ Result<int> demo(const DemoArguments& a) {
   const fs::path sequence =
       cache / fmt::format("demo_{}_{}_{}_{}x{}_{}_{}", SEMVSLAM_VERSION, a.scene.people, a.scene.motion,
                           a.scene.width_px, a.scene.height_px, a.scene.frames, a.scene.seed);
-  std::error_code error;
-  fs::create_directories(a.out, error);  // now: rendering takes long enough to find out afterwards
-  if (error)
-    return Error{ErrorCode::kIo,
-                 fmt::format("{}: cannot make this folder for the results ({})", a.out, error.message())};
+  // Now: rendering takes long enough to find out afterwards.
+  if (const Status status = make_folder(a.out); !status) return status.error();
   if (!fs::exists(sequence)) {
-    fs::create_directories(cache, error);
-    if (error)
-      return Error{ErrorCode::kIo,
-                   fmt::format("{}: cannot make the cache folder ({})", cache.string(), error.message())};
+    if (const Status status = make_folder(cache); !status) return status.error();
     if (!a.quiet) fmt::print(stderr, "rendering {} frames to {}\n", a.scene.frames, sequence.string());
     if (const Status status = render_to_folder(a.scene, sequence, false, a.quiet); !status) return status.error();
   }

@@ -8,6 +8,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "semvslam/data/file_io.h"
+
 namespace semvslam {
 namespace fs = std::filesystem;
 
@@ -36,11 +38,8 @@ std::string format_ply(std::span<const Eigen::Vector3d> points) {
 }
 
 Result<RunOutput> RunOutput::create(const fs::path& folder) {
+  if (const Status status = make_folder(folder); !status) return status.error();
   std::error_code code;
-  fs::create_directories(folder, code);
-  if (!fs::is_directory(folder))
-    return Error{ErrorCode::kIo, fmt::format("{}: cannot make this folder for the results ({})", folder.string(),
-                                             code ? code.message() : "there is a file of that name")};
   for (const char* name : kResultFiles) {
     fs::remove(folder / name, code);
     if (code)

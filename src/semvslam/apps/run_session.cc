@@ -13,6 +13,7 @@
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/base/process_stats.h"
 #include "semvslam/base/stage_timer.h"
+#include "semvslam/data/file_io.h"
 #include "semvslam/data/prefetch.h"
 #include "semvslam/data/text_scan.h"
 #include "semvslam/dynamic/dynamic_overlay.h"
@@ -245,13 +246,6 @@ std::string end_text(const Status& status, int signal) {
   if (signal == SIGINT) return "interrupted (SIGINT)";
   if (signal != 0) return "interrupted (SIGTERM)";
   return "complete";
-}
-
-Status make_folder(const std::filesystem::path& folder) {
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
-  if (!code) return Status::success();
-  return Error{ErrorCode::kIo, fmt::format("{}: cannot make the folder ({})", folder.string(), code.message())};
 }
 
 Status write_key_frame_masks(const std::filesystem::path& folder, const std::vector<KeyFrameMask>& masks) {

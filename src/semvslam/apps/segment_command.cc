@@ -8,6 +8,7 @@
 
 #include "semvslam/apps/command.h"
 #include "semvslam/apps/segmenter_options.h"
+#include "semvslam/data/file_io.h"
 #include "semvslam/semantic/segmentation_files.h"
 
 namespace semvslam {
@@ -23,11 +24,8 @@ Result<int> run_segment(const SegmentArguments& a) {
   StageTimers timers;
   Result<std::unique_ptr<Segmenter>> segmenter = make_segmenter(a.options, RoleTable(), &timers);
   if (!segmenter) return segmenter.error();
-  if (!a.out.empty()) {
-    std::error_code ec;
-    std::filesystem::create_directories(a.out, ec);
-    if (ec) return Error{ErrorCode::kIo, fmt::format("{}: cannot be made: {}", a.out, ec.message())};
-  }
+  if (!a.out.empty())
+    if (const Status status = make_folder(a.out); !status) return status.error();
   StageTimer& whole = timers["whole"];
   for (const std::string& file : a.images) {
     const Result<cv::Mat> image = read_picture(file);

@@ -89,6 +89,14 @@ Status write_file_atomically(const std::filesystem::path& path, std::string_view
   return Status::success();
 }
 
+Status make_folder(const std::filesystem::path& path) {
+  std::error_code code;
+  std::filesystem::create_directories(path, code);
+  if (std::filesystem::is_directory(path)) return Status::success();
+  return Error{ErrorCode::kIo, fmt::format("{}: cannot make the folder: {}", path.string(),
+                                           code ? code.message() : "there is a file of that name")};
+}
+
 OutputFile::OutputFile(OutputFile&& other) noexcept
     : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), length_(other.length_) {}
 

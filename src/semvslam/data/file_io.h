@@ -21,6 +21,9 @@ Status read_binary_file(const std::filesystem::path& path, std::vector<std::uint
 /// disk full; the old file is then untouched and the temporary one removed.
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
+/// Makes a folder and those above it; one that is there already is fine. Errors: not possible, a file of that name.
+Status make_folder(const std::filesystem::path& path);
+
 /// An open file descriptor for writing; closes on destruction. Every write reaches the operating system at once.
 class OutputFile {
  public:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "semvslam/data/camera_file.h"
+#include "semvslam/data/file_io.h"
 #include "semvslam/data/text_scan.h"
 
 namespace semvslam {
@@ -34,10 +35,8 @@ Status SequenceWriter::open_lists() {
   std::error_code error;
   if (fs::exists(folder_ / "rgb.txt", error))
     return Error{ErrorCode::kInvalidInput, folder_.string() + ": holds a recording already; give another folder"};
-  for (const char* name : {"rgb", "depth"}) {
-    fs::create_directories(folder_ / name, error);
-    if (error) return Error{ErrorCode::kIo, (folder_ / name).string() + ": cannot make the folder: " + error.message()};
-  }
+  for (const char* name : {"rgb", "depth"})
+    if (Status s = make_folder(folder_ / name); !s) return s;
   if (Status s = write_file_atomically(folder_ / "camera.yaml", format_camera(camera_)); !s) return s;
   for (const auto& [list, name] : {std::pair{&colour_list_, "rgb.txt"}, std::pair{&depth_list_, "depth.txt"}}) {
     Result<OutputFile> file = OutputFile::create(folder_ / name);
@@ -83,8 +82,7 @@ Status SequenceWriter::write(const RgbdFrame& frame, const std::optional<SE3>& w
   if (Status s = write_image(colour_file, frame.colour.empty() ? frame.gray : frame.colour); !s) return s;
   if (Status s = write_image(depth_file, frame.depth); !s) return s;
   if (!frame.mask.empty()) {
-    std::error_code error;  // told by write_image
-    fs::create_directories(folder_ / "mask", error);
+    if (Status s = make_folder(folder_ / "mask"); !s) return s;
     if (Status s = write_image("mask/" + stamp + ".png", frame.mask); !s) return s;
   }
   if (Status s = colour_list_.write(stamp + " " + colour_file + "\n"); !s) return s;
