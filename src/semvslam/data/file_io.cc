@@ -92,7 +92,8 @@ Status write_file_atomically(const std::filesystem::path& path, std::string_view
 Status make_folder(const std::filesystem::path& path) {
   std::error_code code;
   std::filesystem::create_directories(path, code);
-  if (std::filesystem::is_directory(path)) return Status::success();
+  std::error_code unseen;  // a folder that may not be looked at is none: `code` says why
+  if (std::filesystem::is_directory(path, unseen)) return Status::success();
   return Error{ErrorCode::kIo, fmt::format("{}: cannot make the folder: {}", path.string(),
                                            code ? code.message() : "there is a file of that name")};
 }
