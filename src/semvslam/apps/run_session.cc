@@ -137,7 +137,8 @@ class Session {
   Session(FrameSource& source, const Config& config, Slam& slam, RunOutput& output, const RunOptions& options,
           RunRecord record)
       : source_(source),
-        segmented_(source, segment_ahead_of(config, slam), kMasksAhead),
+        segmented_(source, segment_ahead_of(config, slam), static_cast<std::size_t>(config.segment_at_once),
+                   kMasksAhead),
         slam_(slam),
         output_(output),
         options_(options),

@@ -90,6 +90,9 @@ ConfigSchema Config::schema() {
   s.add("mode", &mode, mode_names(), "preset that the other values begin with: which evidence of motion is used");
   s.add("deterministic", &deterministic, "the same steps in a fixed order on one thread: two runs give the same bytes");
   s.add("realtime", &realtime, "never wait, neither for a mask nor for mapping");
+  s.add("segment.at_once", &segment_at_once, {1, 64},
+        "frames of a recording that are segmented at the same time, each by a copy of the network; deterministic and "
+        "real-time runs segment one");
   s.add("mapping_queue", &mapping_queue, {1, 100}, "key frames that may wait for mapping");
   describe(s, orb);
   describe(s, noise);

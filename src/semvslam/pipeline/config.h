@@ -20,6 +20,7 @@ struct Config {
   bool deterministic = false;  // run the same steps in a fixed order on the calling thread
   bool realtime = false;       // never wait, neither for a mask nor for mapping to take a key frame
   int mapping_queue = 2;       // key frames that may wait for mapping
+  int segment_at_once = 2;     // frames of a recording whose masks are made at the same time
   OrbOptions orb;
   NoiseModel noise;
   TrackingOptions tracking;

@@ -1,18 +1,16 @@
 #include "semvslam/pipeline/segment_ahead.h"
 
+#include <algorithm>
+
+#include "semvslam/base/thread_priority.h"
+
 namespace semvslam {
 
-SegmentAhead::SegmentAhead(FrameSource& source, Segment segment, std::size_t capacity)
-    : source_(source), segment_(std::move(segment)), items_(capacity) {
+SegmentAhead::SegmentAhead(FrameSource& source, Segment segment, std::size_t at_once, std::size_t capacity)
+    : source_(source), segment_(std::move(segment)), items_(capacity + std::max<std::size_t>(1, at_once)) {
   if (!segment_) return;
-  thread_ = std::jthread([this] {
-    bool more = true;
-    while (more) {
-      Item item = read();
-      more = !item.fatal && (!item.result || item.result->has_value());
-      more = items_.push(std::move(item)) && more;
-    }
-  });
+  do threads_.emplace_back([this] { work(); });
+  while (threads_.size() < at_once);
 }
 
 SegmentAhead::~SegmentAhead() { items_.close(); }
@@ -21,12 +19,21 @@ SegmentAhead::Item SegmentAhead::read() {
   Result<std::optional<RgbdFrame>> next = source_.next();
   if (!next) return {next.error(), source_.fatal()};
   if (!*next) return {std::optional<SegmentedFrame>(), false};
-  SegmentedFrame frame{std::move(**next), false, std::nullopt};
-  if (segment_) {
-    frame.has_segmentation = true;
-    frame.segmentation = segment_(frame.frame);
+  return {std::optional<SegmentedFrame>({std::move(**next), segment_ != nullptr, std::nullopt}), false};
+}
+
+void SegmentAhead::work() {
+  lower_thread_priority();
+  while (true) {
+    std::unique_lock lock(reading_);
+    if (ended_) return;
+    Item item = read();
+    std::promise<Item> promise;
+    ended_ = !items_.push(promise.get_future()) || item.is_last();
+    lock.unlock();
+    if (item.result && *item.result) (*item.result)->segmentation = segment_((*item.result)->frame);
+    promise.set_value(std::move(item));
   }
-  return {std::optional<SegmentedFrame>(std::move(frame)), false};
 }
 
 Result<std::optional<SegmentedFrame>> SegmentAhead::next() {
@@ -35,12 +42,13 @@ Result<std::optional<SegmentedFrame>> SegmentAhead::next() {
     fatal_ = item.fatal;
     return std::move(item.result);
   }
-  std::optional<Item> item = items_.pop();
-  if (!item) return std::optional<SegmentedFrame>();
-  fatal_ = item->fatal;
+  std::optional<std::future<Item>> promised = items_.pop();
+  if (!promised) return std::optional<SegmentedFrame>();
+  Item item = promised->get();
+  fatal_ = item.fatal;
   // Nothing comes after the end: later calls must not wait for it.
-  if (item->fatal || (item->result && !item->result->has_value())) items_.close();
-  return std::move(item->result);
+  if (item.is_last()) items_.close();
+  return std::move(item.result);
 }
 
 }  // namespace semvslam

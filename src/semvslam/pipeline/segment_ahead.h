@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <functional>
-#include <memory>
+#include <future>
+#include <mutex>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/base/result.h"
@@ -19,16 +21,20 @@ struct SegmentedFrame {
   std::optional<Segmentation> segmentation;
 };
 
-/// Reads a recording and segments every frame in a thread of its own, while the frames before are tracked: each frame
-/// comes with its own mask. At most `capacity` frames ahead; the reading thread BLOCKS when they are not fetched.
-/// Destruction at any time stops after the frame that is being segmented.
+/// Reads a recording and segments its frames in threads of its own, while the frames before are tracked: each frame
+/// comes with its own mask, in the source's order. At most `capacity` frames wait beside those being segmented; the
+/// threads BLOCK when they are not fetched. They give way to all other threads, where the system lets them: masks are
+/// made in what time tracking and mapping leave. Destruction at any time stops after the frames that are being
+/// segmented.
 class SegmentAhead {
  public:
   using Segment = std::function<std::optional<Segmentation>(const RgbdFrame&)>;
 
-  /// @param source must outlive this object and is used by its thread only.
-  /// @param segment called on that thread; empty = frames come without segmentation, on the calling thread.
-  SegmentAhead(FrameSource& source, Segment segment, std::size_t capacity);
+  /// @param source must outlive this object and is used by its threads only, by one at a time.
+  /// @param segment called on those threads, by as many at once as there are; empty = frames come without
+  /// segmentation, on the calling thread.
+  /// @param at_once so many frames are segmented at the same time, at least one.
+  SegmentAhead(FrameSource& source, Segment segment, std::size_t at_once, std::size_t capacity);
   ~SegmentAhead();
 
   /// As FrameSource::next. One thread.
@@ -39,14 +45,18 @@ class SegmentAhead {
   struct Item {
     Result<std::optional<SegmentedFrame>> result;
     bool fatal = false;
+    bool is_last() const { return fatal || (result && !result->has_value()); }
   };
   Item read();
+  void work();
 
   FrameSource& source_;
   const Segment segment_;
-  BoundedQueue<Item> items_;
+  std::mutex reading_;  // of source_ and ended_; held until the frame has its place in the order
+  bool ended_ = false;
+  BoundedQueue<std::future<Item>> items_;
   bool fatal_ = false;
-  std::jthread thread_;
+  std::vector<std::jthread> threads_;
 };
 
 }  // namespace semvslam

@@ -42,34 +42,36 @@ std::optional<Segmentation> segment(const RgbdFrame& frame) {
 }
 
 TEST(SegmentAhead, EveryFrameComesWithItsOwnSegmentationInOrder) {
-  CountingSource source(30, false);
-  SegmentAhead ahead(source, segment, 2);
-  for (std::uint32_t i = 0; i < 30; ++i) {
-    const auto next = ahead.next();
-    if (i % 3 == 2) {
-      ASSERT_FALSE(next);
-      EXPECT_FALSE(ahead.fatal());
-      continue;
+  for (const std::size_t at_once : {1u, 2u, 5u}) {
+    CountingSource source(30, false);
+    SegmentAhead ahead(source, segment, at_once, 2);
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      const auto next = ahead.next();
+      if (i % 3 == 2) {
+        ASSERT_FALSE(next);
+        EXPECT_FALSE(ahead.fatal());
+        continue;
+      }
+      ASSERT_TRUE(next);
+      ASSERT_TRUE(*next);
+      EXPECT_EQ((*next)->frame.id.value, i);
+      EXPECT_TRUE((*next)->has_segmentation);
+      ASSERT_EQ((*next)->segmentation.has_value(), i != 4);
+      if (i != 4) {
+        EXPECT_EQ((*next)->segmentation->frame.value, i);
+      }
     }
-    ASSERT_TRUE(next);
-    ASSERT_TRUE(*next);
-    EXPECT_EQ((*next)->frame.id.value, i);
-    EXPECT_TRUE((*next)->has_segmentation);
-    ASSERT_EQ((*next)->segmentation.has_value(), i != 4);
-    if (i != 4) {
-      EXPECT_EQ((*next)->segmentation->frame.value, i);
+    for (int again = 0; again < 2; ++again) {
+      const auto end = ahead.next();
+      ASSERT_TRUE(end);
+      EXPECT_FALSE(*end);
     }
-  }
-  for (int again = 0; again < 2; ++again) {
-    const auto end = ahead.next();
-    ASSERT_TRUE(end);
-    EXPECT_FALSE(*end);
   }
 }
 
 TEST(SegmentAhead, WithoutASegmenterFramesPassThrough) {
   CountingSource source(2, false);
-  SegmentAhead ahead(source, {}, 2);
+  SegmentAhead ahead(source, {}, 1, 2);
   const auto next = ahead.next();
   ASSERT_TRUE(next && *next);
   EXPECT_FALSE((*next)->has_segmentation);
@@ -77,7 +79,7 @@ TEST(SegmentAhead, WithoutASegmenterFramesPassThrough) {
 
 TEST(SegmentAhead, AFatalErrorIsTheLastThingThatComes) {
   CountingSource source(1, true);
-  SegmentAhead ahead(source, segment, 2);
+  SegmentAhead ahead(source, segment, 2, 2);
   ASSERT_TRUE(ahead.next());
   const auto failed = ahead.next();
   ASSERT_FALSE(failed);
@@ -86,19 +88,40 @@ TEST(SegmentAhead, AFatalErrorIsTheLastThingThatComes) {
 }
 
 TEST(SegmentAhead, DestructionDoesNotWaitForTheEndOfTheStream) {
-  CountingSource source(1'000'000, false);
-  std::atomic<int> segmented = 0;
-  {
-    SegmentAhead ahead(
-        source,
-        [&](const RgbdFrame& frame) {
-          ++segmented;
-          return segment(frame);
-        },
-        3);
-    ASSERT_TRUE(ahead.next());
+  for (const std::size_t at_once : {1u, 3u}) {
+    CountingSource source(1'000'000, false);
+    std::atomic<std::size_t> segmented = 0;
+    {
+      SegmentAhead ahead(
+          source,
+          [&](const RgbdFrame& frame) {
+            ++segmented;
+            return segment(frame);
+          },
+          at_once, 3);
+      ASSERT_TRUE(ahead.next());
+    }
+    EXPECT_LE(segmented, 1 + 3 + 2 * at_once) << "fetched, waiting and in work, and none after";
   }
-  EXPECT_LE(segmented, 3 + 3) << "fetched, queued and in work, and none after";
+}
+
+TEST(SegmentAhead, SlowFramesDoNotHoldUpTheOthersAndKeepTheirPlace) {
+  CountingSource source(6, false);
+  std::promise<void> later_is_done;
+  std::shared_future<void> done = later_is_done.get_future().share();
+  SegmentAhead ahead(
+      source,
+      [&](const RgbdFrame& frame) {
+        if (frame.id.value == 0) done.wait();
+        if (frame.id.value == 1) later_is_done.set_value();
+        return segment(frame);
+      },
+      2, 2);
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    const auto next = ahead.next();
+    ASSERT_TRUE(next && *next);
+    EXPECT_EQ((*next)->frame.id.value, i);
+  }
 }
 
 }  // namespace

@@ -2,32 +2,61 @@
 
 namespace semvslam {
 
+SegmentationStage::SegmentationStage(const Config& config) : options_(config.segment), damage_(config.damage) {
+  // The fast number type differs from machine to machine; equal bytes need the same one everywhere.
+  if (config.deterministic) options_.precision = "f32";
+}
+
 Result<std::unique_ptr<SegmentationStage>> SegmentationStage::create(const Config& config) {
   std::unique_ptr<SegmentationStage> stage(new SegmentationStage(config));
-  SegmenterOptions options = config.segment;
-  // The fast number type differs from machine to machine; equal bytes need the same one everywhere.
-  if (config.deterministic) options.precision = "f32";
-  Result<std::unique_ptr<Segmenter>> segmenter = make_segmenter(options, RoleTable(), &stage->timers_);
-  if (!segmenter) return segmenter.error();
-  stage->segmenter_ = std::move(*segmenter);
+  Result<std::unique_ptr<Segmenter>> first = stage->borrow();
+  if (!first) return first.error();
+  stage->give_back(std::move(*first));
   return stage;
 }
 
 SegmentationStage::~SegmentationStage() { frames_.close(); }
 
+Result<std::unique_ptr<Segmenter>> SegmentationStage::borrow() {
+  {
+    std::lock_guard lock(mutex_);
+    if (!free_.empty()) {
+      std::unique_ptr<Segmenter> segmenter = std::move(free_.back());
+      free_.pop_back();
+      return segmenter;
+    }
+  }
+  return make_segmenter(options_, RoleTable(), &timers_);
+}
+
+void SegmentationStage::give_back(std::unique_ptr<Segmenter> segmenter) {
+  std::lock_guard lock(mutex_);
+  free_.push_back(std::move(segmenter));
+}
+
+void SegmentationStage::fail(Error error) {
+  std::lock_guard lock(mutex_);
+  if (!failure_) failure_ = std::move(error);
+}
+
 std::optional<Segmentation> SegmentationStage::segment(const RgbdFrame& frame) {
   if (!status()) return std::nullopt;
+  Result<std::unique_ptr<Segmenter>> segmenter = borrow();
+  if (!segmenter) {
+    fail(segmenter.error());
+    return std::nullopt;
+  }
   SegmentationRequest request;
   request.frame = frame.id;
   request.stamp = frame.stamp;
   request.image = frame.colour.empty() ? frame.gray : frame.colour;
   Result<Segmentation> result = [&] {
     const auto timing = timers_["segment"].time();
-    return segmenter_->segment(request);
+    return (*segmenter)->segment(request);
   }();
+  give_back(std::move(*segmenter));
   if (!result) {
-    std::lock_guard lock(mutex_);
-    failure_ = result.error();
+    fail(result.error());
     return std::nullopt;
   }
   return damage_.apply(*result);

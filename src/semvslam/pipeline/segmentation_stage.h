@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "semvslam/base/newest_slot.h"
 #include "semvslam/base/result.h"
@@ -24,7 +25,8 @@ class SegmentationStage {
   ~SegmentationStage();
 
   /// The objects in this frame; nothing after a failure, or where damage for tests took the whole segmentation away.
-  /// One thread at a time.
+  /// Any number of threads: of those that call at the same time each has a segmenter of its own, made when first
+  /// needed.
   std::optional<Segmentation> segment(const RgbdFrame& frame);
 
   /// Gives the newest frame to the stage's own thread, in place of one that it has not begun with.
@@ -37,12 +39,17 @@ class SegmentationStage {
   std::vector<StageSummary> times() const { return timers_.summaries(); }
 
  private:
-  SegmentationStage(const Config& config) : damage_(config.damage) {}
+  explicit SegmentationStage(const Config& config);
+  /// One that no other thread uses until it is given back; made where there is none.
+  Result<std::unique_ptr<Segmenter>> borrow();
+  void give_back(std::unique_ptr<Segmenter> segmenter);
+  void fail(Error error);
 
+  SegmenterOptions options_;
   StageTimers timers_;
-  std::unique_ptr<Segmenter> segmenter_;
   MaskDamage damage_;
-  mutable std::mutex mutex_;  // of failure_
+  mutable std::mutex mutex_;  // of free_ and failure_
+  std::vector<std::unique_ptr<Segmenter>> free_;
   std::optional<Error> failure_;
   NewestSlot<RgbdFrame> frames_;       // drops the frame that is waiting
   NewestSlot<Segmentation> finished_;  // drops the mask that nobody fetched

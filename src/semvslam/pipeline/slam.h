@@ -91,7 +91,8 @@ class Slam {
   Result<TrackResult> process(const RgbdFrame& frame);
   /// The same for a frame that segment() was called for before, on any thread.
   Result<TrackResult> process(const RgbdFrame& frame, std::optional<Segmentation> segmentation);
-  /// Segments a frame, for callers that read ahead (SegmentAhead). One thread at a time; not with Config::realtime.
+  /// Segments a frame, for callers that read ahead (SegmentAhead). Any number of threads; not with
+  /// Config::realtime.
   std::optional<Segmentation> segment(const RgbdFrame& frame);
   void add_sink(std::shared_ptr<Sink> sink);
   /// Waits until mapping has worked off what it was given, then adjusts the whole map once more
