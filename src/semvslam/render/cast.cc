@@ -95,7 +95,8 @@ void Cast::build_item(Member& member, SceneBuilder& builder, std::uint64_t seed)
                     false};
     builder.box(on_plan(0, 0.44, 1.01), {0.36, 0.30, 0.26}, skin);
   } else if (member.item == Item::kSuitcase) {
-    const Skin shell = plain(hue_colour(random.uniform(), 0.7, random.uniform(0.3, 0.7))), dark = plain({45, 42, 40});
+    const double value = random.uniform(0.3, 0.7), hue = random.uniform();
+    const Skin shell = plain(hue_colour(hue, 0.7, value)), dark = plain({45, 42, 40});
     const SE3 here = on_plan(0.31, -0.10, 0.05);
     builder.box(here, {0.23, 0.40, 0.56}, shell);
     for (int i = 0; i < 5; ++i) builder.box(here * on_plan(0, -0.16 + 0.08 * i, 0.02), {0.25, 0.02, 0.52}, shell);

@@ -181,7 +181,8 @@ void Furnisher::sofa(const SE3& pose, double width_m) {
   for (int i = 0; i < seats; ++i) {
     const double x = -width_m / 2 + 0.2 + (i + 0.5) * part;
     builder_.box(pose * on_plan(x, -0.08, 0.30), {part - 0.02, 0.62, 0.14}, cover);
-    const SE3 pillow = pose * on_plan(x + random_.uniform(-0.1, 0.1), 0.13, 0.45, random_.uniform(-20, 20)) *
+    const double turn_deg = random_.uniform(-20, 20), aside = random_.uniform(-0.1, 0.1);
+    const SE3 pillow = pose * on_plan(x + aside, 0.13, 0.45, turn_deg) *
                        SE3(Eigen::Quaterniond(Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX())), {0, 0, 0});
     builder_.box(pillow, {0.38, 0.1, 0.34}, Skin{fabric_[random_.below(3)], {0.22, 0.22}, {0, 0}, false});
   }
@@ -209,8 +210,8 @@ void Furnisher::keyboard(const SE3& pose) {
   builder_.begin_mesh();
   const Skin top{keyboard_, {0, 0}, {0, 0}, false};
   builder_.box(pose, {0.42, 0.14, 0.02}, plain(black_), plain(black_), top);
-  builder_.box(pose * on_plan(0.29, random_.uniform(-0.02, 0.02), 0, random_.uniform(-15, 15)), {0.055, 0.1, 0.03},
-               plain(black_));
+  const double turn_deg = random_.uniform(-15, 15), ahead = random_.uniform(-0.02, 0.02);
+  builder_.box(pose * on_plan(0.29, ahead, 0, turn_deg), {0.055, 0.1, 0.03}, plain(black_));
 }
 
 void Furnisher::plant(const SE3& pose, double height_m) {
@@ -225,8 +226,9 @@ void Furnisher::plant(const SE3& pose, double height_m) {
     const Eigen::Vector3d direction = Eigen::Vector3d(std::cos(a), std::sin(a), rise).normalized();
     const double length = (height_m - pot) * random_.uniform(0.5, 0.95);
     const Eigen::Vector3d root = pose * Eigen::Vector3d(0.3 * r * std::cos(a), 0.3 * r * std::sin(a), pot * 0.9);
-    builder_.leaf(root, direction, length, length * random_.uniform(0.16, 0.3), random_.uniform(0.3, 1.6),
-                  Skin{leaf_[random_.below(2)], {0, 0}, {0, 0}, false});
+    const Skin skin{leaf_[random_.below(2)], {0, 0}, {0, 0}, false};
+    const double bend = random_.uniform(0.3, 1.6), width = length * random_.uniform(0.16, 0.3);
+    builder_.leaf(root, direction, length, width, bend, skin);
   }
 }
 
@@ -304,10 +306,11 @@ void Furnisher::book_stack(const SE3& pose, int books) {
 
 void Furnisher::pages(const SE3& pose, int sheets) {
   for (int i = 0; i < sheets; ++i) {
-    builder_.box(pose * on_plan(random_.uniform(-0.06, 0.06), random_.uniform(-0.05, 0.05), 0.0022 * i,
-                                random_.uniform(-40, 40)),
-                 {0.21, 0.297, 0.002}, plain(white_), plain(white_),
-                 Skin{page_[random_.below(3)], {0, 0}, {0, 0}, false});
+    const Skin printed{page_[random_.below(3)], {0, 0}, {0, 0}, false};
+    const double turn_deg = random_.uniform(-40, 40), y = random_.uniform(-0.05, 0.05),
+                 x = random_.uniform(-0.06, 0.06);
+    builder_.box(pose * on_plan(x, y, 0.0022 * i, turn_deg), {0.21, 0.297, 0.002}, plain(white_), plain(white_),
+                 printed);
   }
 }
 

@@ -22,6 +22,12 @@ cv::Scalar any_colour(RandomStream& random, double saturation, double low, doubl
   return scalar(hue_colour(random.uniform(), 0.75 * strength, value));
 }
 
+/// Numbers are drawn one by one, never two in the arguments of one call: their order differs from compiler to compiler.
+cv::Point any_place(RandomStream& random, int width, int height) {
+  const int y = random.below(height);
+  return {random.below(width), y};
+}
+
 /// A word of random letters; syllables, so that word shapes look like writing.
 std::string word(RandomStream& random) {
   static const char* const kSyllables[] = {"ka", "lo", "ven", "ta", "ri",  "mo", "sel", "du",  "on", "pra",
@@ -30,6 +36,11 @@ std::string word(RandomStream& random) {
   const int parts = 1 + random.below(3);
   for (int i = 0; i < parts; ++i) text += kSyllables[random.below(20)];
   return text;
+}
+
+std::string two_words(RandomStream& random) {
+  const std::string second = word(random);
+  return word(random) + " " + second;
 }
 
 /// Text lines in a rectangle; ragged right.
@@ -86,11 +97,12 @@ void paint_landscape(cv::Mat& image, RandomStream& random) {
     cv::fillPoly(image, std::vector<std::vector<cv::Point>>{ridge}, colour, cv::LINE_AA);
   }
   for (int i = 0; i < 30; ++i) {  // trees
-    const cv::Point foot(random.below(w), static_cast<int>(h * random.uniform(0.75, 1.0)));
+    const int ground = static_cast<int>(h * random.uniform(0.75, 1.0));
+    const cv::Point foot(random.below(w), ground);
     const int t = std::max(3, static_cast<int>(h * random.uniform(0.04, 0.14)));
     const std::vector<cv::Point> tree{{foot.x - t / 3, foot.y}, {foot.x + t / 3, foot.y}, {foot.x, foot.y - t}};
-    cv::fillConvexPoly(image, tree, scalar(hue_colour(random.uniform(0.25, 0.42), 0.6, random.uniform(0.15, 0.45))),
-                       cv::LINE_AA);
+    const double value = random.uniform(0.15, 0.45), hue = random.uniform(0.25, 0.42);
+    cv::fillConvexPoly(image, tree, scalar(hue_colour(hue, 0.6, value)), cv::LINE_AA);
   }
 }
 
@@ -98,8 +110,9 @@ void paint_shapes(cv::Mat& image, RandomStream& random) {
   const int w = image.cols, h = image.rows;
   image.setTo(any_colour(random, 0.3, 0.6, 0.95));
   for (int i = 0; i < 34; ++i) {
-    const cv::Point at(random.below(w), random.below(h));
-    const int r = std::max(2, static_cast<int>(w * random.uniform(0.02, 0.22) * random.uniform()));
+    const cv::Point at = any_place(random, w, h);
+    const double largest = w * random.uniform(0.02, 0.22);
+    const int r = std::max(2, static_cast<int>(largest * random.uniform()));
     const cv::Scalar c = any_colour(random, 0.9, 0.15, 0.95);
     switch (random.below(4)) {
       case 0:
@@ -136,7 +149,7 @@ cv::Mat paint_poster(cv::Size size, std::uint64_t seed) {
     else
       paint_shapes(picture, random);
     const cv::Scalar ink = any_colour(random, 0.5, 0.05, 0.3);
-    cv::putText(image, word(random) + " " + word(random), {w / 12, h / 7}, cv::FONT_HERSHEY_DUPLEX, w / 260.0, ink,
+    cv::putText(image, two_words(random), {w / 12, h / 7}, cv::FONT_HERSHEY_DUPLEX, w / 260.0, ink,
                 std::max(1, w / 120), cv::LINE_AA);
     write_block(image, {w / 12, h * 3 / 4, w * 10 / 12, h / 5}, std::max(7, h / 30), ink, random);
   }
@@ -159,12 +172,13 @@ cv::Mat paint_spines(cv::Size size, int count, std::uint64_t seed) {
     const int bands = random.below(4);
     for (int b = 0; b < bands; ++b) {
       const int x = random.below(h);
-      cv::rectangle(spine, {x, 0, 2 + random.below(h / 8), w}, any_colour(random, 0.8, 0.1, 0.95), cv::FILLED);
+      const cv::Scalar colour = any_colour(random, 0.8, 0.1, 0.95);
+      cv::rectangle(spine, {x, 0, 2 + random.below(h / 8), w}, colour, cv::FILLED);
     }
     const double scale = w / 34.0;
-    cv::putText(spine, word(random) + " " + word(random), {h / 8, w * 2 / 3},
-                random.chance(0.5) ? cv::FONT_HERSHEY_DUPLEX : cv::FONT_HERSHEY_TRIPLEX,
-                scale * random.uniform(0.6, 1.0), ink, 1, cv::LINE_AA);
+    const double size_of_letters = scale * random.uniform(0.6, 1.0);
+    const int font = random.chance(0.5) ? cv::FONT_HERSHEY_DUPLEX : cv::FONT_HERSHEY_TRIPLEX;
+    cv::putText(spine, two_words(random), {h / 8, w * 2 / 3}, font, size_of_letters, ink, 1, cv::LINE_AA);
     for (int r = 0; r < w; ++r) {  // rounded back: darker to both sides
       const double side = 2.0 * (r + 0.5) / w - 1.0;
       spine.row(r).convertTo(spine.row(r), CV_8UC3, 1.0 - 0.45 * side * side * side * side);
@@ -185,8 +199,9 @@ cv::Mat paint_screen(cv::Size size, std::uint64_t seed) {
   const int windows = 2 + random.below(3);
   for (int i = 0; i < windows; ++i) {
     const bool dark = random.chance(0.5);
-    const cv::Rect area(random.below(w / 2), h / 20 + random.below(h / 3), w / 3 + random.below(w / 4),
-                        h / 3 + random.below(h / 4));
+    const int tall = h / 3 + random.below(h / 4), wide = w / 3 + random.below(w / 4),
+              top = h / 20 + random.below(h / 3);
+    const cv::Rect area(random.below(w / 2), top, wide, tall);
     const cv::Rect in = area & cv::Rect(0, 0, w, h);
     cv::rectangle(image, in, dark ? cv::Scalar(42, 36, 34) : cv::Scalar(238, 240, 240), cv::FILLED);
     cv::rectangle(image, {in.x, in.y, in.width, h / 28}, dark ? cv::Scalar(80, 70, 60) : cv::Scalar(205, 180, 150),
@@ -223,8 +238,8 @@ cv::Mat paint_page(cv::Size size, std::uint64_t seed) {
   RandomStream random(seed);
   cv::Mat image(size, CV_8UC3, cv::Scalar(232, 238, 240));
   const int w = size.width, h = size.height, line = std::max(7, h / 40);
-  cv::putText(image, word(random) + " " + word(random), {w / 10, h / 9}, cv::FONT_HERSHEY_DUPLEX, w / 420.0,
-              {30, 25, 25}, 1 + w / 300, cv::LINE_AA);
+  cv::putText(image, two_words(random), {w / 10, h / 9}, cv::FONT_HERSHEY_DUPLEX, w / 420.0, {30, 25, 25}, 1 + w / 300,
+              cv::LINE_AA);
   const int columns = 1 + random.below(2);
   for (int c = 0; c < columns; ++c) {
     write_block(image, {w / 10 + c * w * 8 / 10 / columns, h / 7, w * 8 / 10 / columns - w / 30, h * 5 / 7}, line,
@@ -234,9 +249,10 @@ cv::Mat paint_page(cv::Size size, std::uint64_t seed) {
   paint_shapes(figure, random);
   const cv::Scalar pen = any_colour(random, 1.0, 0.4, 0.8);
   for (int i = 0; i < 3; ++i) {
-    cv::ellipse(image, {random.below(w), random.below(h)},
-                {w / 12 + random.below(w / 10), h / 30 + random.below(h / 20)}, random.uniform(-20, 20), 0, 330, pen, 2,
-                cv::LINE_AA);
+    const double turn_deg = random.uniform(-20, 20);
+    const cv::Size axes{w / 12 + random.below(w / 10), h / 30 + random.below(h / 20)};
+    const cv::Point centre{random.below(w), random.below(h)};
+    cv::ellipse(image, centre, axes, turn_deg, 0, 330, pen, 2, cv::LINE_AA);
   }
   add_grain(image, 0.1f, random.bits32());
   return image;
@@ -247,14 +263,15 @@ cv::Mat paint_whiteboard(cv::Size size, std::uint64_t seed) {
   cv::Mat image(size, CV_8UC3, cv::Scalar(228, 230, 228));
   const int w = size.width, h = size.height;
   for (int i = 0; i < 25; ++i) {  // wiped remains
-    cv::line(image, {random.below(w), random.below(h)}, {random.below(w), random.below(h)}, cv::Scalar(214, 216, 216),
-             6 + random.below(18), cv::LINE_AA);
+    const int thickness = 6 + random.below(18);
+    const cv::Point to{random.below(w), random.below(h)}, from{random.below(w), random.below(h)};
+    cv::line(image, from, to, cv::Scalar(214, 216, 216), thickness, cv::LINE_AA);
   }
   const cv::Scalar pens[] = {{120, 40, 20}, {30, 30, 170}, {40, 35, 30}, {50, 110, 30}};
   for (int i = 0; i < 9; ++i) {
     const cv::Scalar pen = pens[random.below(4)];
-    const cv::Rect area(random.below(w * 3 / 4), random.below(h * 3 / 4), w / 6 + random.below(w / 8),
-                        h / 8 + random.below(h / 8));
+    const int tall = h / 8 + random.below(h / 8), wide = w / 6 + random.below(w / 8);
+    const cv::Rect area(any_place(random, w * 3 / 4, h * 3 / 4), cv::Size(wide, tall));
     const int kind = random.below(3);
     if (kind == 0) write_block(image, area, std::max(10, h / 16), pen, random);
     if (kind == 1) {
@@ -276,7 +293,7 @@ cv::Mat paint_whiteboard(cv::Size size, std::uint64_t seed) {
     }
   }
   for (int i = 0; i < 5; ++i) {  // notes held by magnets
-    const cv::Point at(random.below(w - w / 8), random.below(h - h / 6));
+    const cv::Point at = any_place(random, w - w / 8, h - h / 6);
     cv::rectangle(image, {at.x, at.y, w / 14, w / 14}, any_colour(random, 0.7, 0.75, 1.0), cv::FILLED);
     write_block(image, {at.x + 3, at.y, w / 14 - 6, w / 14}, 9, {60, 60, 60}, random);
     cv::circle(image, {at.x + w / 28, at.y + 3}, 5, any_colour(random, 1, 0.3, 0.9), cv::FILLED, cv::LINE_AA);
@@ -304,7 +321,8 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
     const int bw = w / 8 + random.below(w / 8), bh = h / 4 + random.below(h / 4), x = random.below(w) - bw / 2,
               y = h - bh;
     cv::rectangle(image, {x, y, bw, bh}, any_colour(random, 0.35, 0.55, 0.85), cv::FILLED);
-    const cv::Scalar roof = scalar(hue_colour(random.uniform(0.0, 0.06), 0.6, random.uniform(0.35, 0.6)));
+    const double value = random.uniform(0.35, 0.6);
+    const cv::Scalar roof = scalar(hue_colour(random.uniform(0.0, 0.06), 0.6, value));
     cv::fillConvexPoly(image, std::vector<cv::Point>{{x - 4, y}, {x + bw + 4, y}, {x + bw / 2, y - bh / 4}}, roof,
                        cv::LINE_AA);
     for (int r = 0; r < 4; ++r) {
@@ -318,10 +336,10 @@ cv::Mat paint_outdoors(cv::Size size, std::uint64_t seed) {
     const int r = 2 + random.below(w / 110);
     const double lit = static_cast<double>(i) / 2600;
     const double x = random.uniform() * w, crown = 0.62 + 0.18 * std::sin(x * 0.02) + 0.1 * std::sin(x * 0.053);
+    const double value = random.uniform(0.15, 0.35) + 0.35 * lit, saturation = random.uniform(0.35, 0.65),
+                 hue = random.uniform(0.2, 0.34);
     cv::circle(image, {static_cast<int>(x), static_cast<int>(h * random.uniform(crown, 1.05))}, r,
-               scalar(hue_colour(random.uniform(0.2, 0.34), random.uniform(0.35, 0.65),
-                                 random.uniform(0.15, 0.35) + 0.35 * lit)),
-               cv::FILLED, cv::LINE_AA);
+               scalar(hue_colour(hue, saturation, value)), cv::FILLED, cv::LINE_AA);
   }
   return image;
 }
@@ -387,8 +405,8 @@ cv::Mat paint_label(cv::Size size, std::uint64_t seed) {
   for (int i = 0; i < 2; ++i) {
     const int x = i * w / 2;
     cv::circle(image, {x + w / 4, h / 2}, h / 5, any_colour(random, 0.9, 0.3, 1.0), cv::FILLED, cv::LINE_AA);
-    cv::putText(image, word(random), {x + w / 14, h * 9 / 16}, cv::FONT_HERSHEY_DUPLEX, w / 330.0,
-                any_colour(random, 0.4, 0.0, 0.3), 2, cv::LINE_AA);
+    const cv::Scalar ink = any_colour(random, 0.4, 0.0, 0.3);
+    cv::putText(image, word(random), {x + w / 14, h * 9 / 16}, cv::FONT_HERSHEY_DUPLEX, w / 330.0, ink, 2, cv::LINE_AA);
   }
   add_grain(image, 0.15f, random.bits32());
   return image;

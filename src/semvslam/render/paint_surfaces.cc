@@ -176,11 +176,12 @@ cv::Mat paint_rug(cv::Size size, std::uint64_t seed) {
   const int field = static_cast<int>(0.17 * h);
   cv::rectangle(image, {field, field}, {w - field, h - field}, tone(hue + 0.02, 0.62, 0.48), cv::FILLED);
   for (int i = 0; i < 130; ++i) {
-    const cv::Point at(static_cast<int>(random.uniform(field, w - field)),
-                       static_cast<int>(random.uniform(field, h - field)));
+    const int y = static_cast<int>(random.uniform(field, h - field));
+    const cv::Point at(static_cast<int>(random.uniform(field, w - field)), y);
     const double r = random.uniform(0.012, 0.075) * h;
     const int petals = 3 + random.below(6);
-    const cv::Scalar c = tone(hue + random.uniform(-0.2, 0.5), random.uniform(0.2, 0.7), random.uniform(0.25, 0.85));
+    const double value = random.uniform(0.25, 0.85), saturation = random.uniform(0.2, 0.7);
+    const cv::Scalar c = tone(hue + random.uniform(-0.2, 0.5), saturation, value);
     for (int k = 0; k < petals; ++k) {
       const double a = 2 * M_PI * k / petals;
       cv::ellipse(image,
@@ -214,9 +215,11 @@ cv::Mat paint_wallpaper(cv::Size size, std::uint64_t seed) {
   });
   const int ornaments = size.area() / 5200;
   for (int i = 0; i < ornaments; ++i) {
-    const cv::Point at(random.below(size.width), random.below(size.height));
+    const int y = random.below(size.height);
+    const cv::Point at(random.below(size.width), y);
     const double r = random.uniform(4, 17);
-    const cv::Vec3f c = hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), 0.45, random.uniform(0.35, 0.75));
+    const double value = random.uniform(0.35, 0.75);
+    const cv::Vec3f c = hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), 0.45, value);
     const int petals = 4 + random.below(4);
     const double turn = random.uniform(0, 6.28);
     for (int k = 0; k < petals; ++k) {

@@ -84,14 +84,22 @@ PersonLook random_look(std::uint64_t seed) {
   look.bottom = look.skirt ? (random.chance(0.5) ? Cloth::kPlain : Cloth::kChecks)
                            : (random.chance(0.6) ? Cloth::kJeans : Cloth::kPlain);
   const double hue = random.uniform();
-  look.top_tone = hue_colour(hue, random.uniform(0.25, 0.75), random.uniform(0.25, 0.85));
-  look.top_second =
-      hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), random.uniform(0.0, 0.5), random.uniform(0.1, 0.9));
-  look.bottom_tone = look.bottom == Cloth::kJeans
-                         ? cv::Vec3f(118, 82, 58) * static_cast<float>(random.uniform(0.6, 1.25))
-                         : hue_colour(random.uniform(0.05, 0.7), 0.25, random.uniform(0.16, 0.6));
-  look.shoes =
-      random.chance(0.3) ? cv::Vec3f(200, 205, 208) : hue_colour(random.uniform(), 0.3, random.uniform(0.1, 0.3));
+  double value = random.uniform(0.25, 0.85);
+  look.top_tone = hue_colour(hue, random.uniform(0.25, 0.75), value);
+  value = random.uniform(0.1, 0.9);
+  const double saturation = random.uniform(0.0, 0.5);
+  look.top_second = hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), saturation, value);
+  if (look.bottom == Cloth::kJeans) {
+    look.bottom_tone = cv::Vec3f(118, 82, 58) * static_cast<float>(random.uniform(0.6, 1.25));
+  } else {
+    value = random.uniform(0.16, 0.6);
+    look.bottom_tone = hue_colour(random.uniform(0.05, 0.7), 0.25, value);
+  }
+  look.shoes = cv::Vec3f(200, 205, 208);
+  if (!random.chance(0.3)) {
+    value = random.uniform(0.1, 0.3);
+    look.shoes = hue_colour(random.uniform(), 0.3, value);
+  }
   return look;
 }
 
