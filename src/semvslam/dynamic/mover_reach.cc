@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <utility>
 
 namespace semvslam {
 namespace {
@@ -14,7 +13,6 @@ constexpr float kBodyDepthM = 0.6f;   // no part of a thing is farther before or
 constexpr float kLimbDepthM = 0.3f;   // nor a limb from the place where it leaves the mask
 constexpr float kStepShare = 0.025f;  // of the depth: a larger step between neighbours is an edge
 constexpr float kEdgeShare = 0.05f;   // the same between any two of the cells around a place
-constexpr int kLongestHole = 4;       // cells without depth that a surface may go on behind
 constexpr float kBucketsPerM = 100;   // distances are told apart to a centimetre
 
 struct Front {
@@ -66,31 +64,27 @@ void MoverReach::add(const cv::Rect& window, const cv::Mat& mask, float depth_m)
 void MoverReach::spread() {
   const float cell_share = static_cast<float>(kPx / fx_px_);  // width of a cell, share of its depth
   const auto reach_m = static_cast<float>(reach_m_);
-  const int columns = grid_.columns, rows = grid_.rows;
+  const CellGrid& grid = grid_;
   const Place* const places = places_.data();
-  const float* const depths_m = grid_.depth_m.data();
+  const float* const depths_m = grid.depth_m.data();
   float* const distances_m = distances_m_.data();
   std::vector<std::vector<Front>> open(static_cast<std::size_t>(reach_m * kBucketsPerM) + 2);
   for (const int cell : cores_) distances_m[cell] = 0;
-  const auto go_on = [=, &open](const Front& at) {
-    const int c = at.cell % columns, r = at.cell / columns;
-    for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      if (c + dc < 0 || r + dr < 0 || c + dc >= columns || r + dr >= rows) continue;
-      const int cell = at.cell + dr * columns + dc;
-      if (distances_m[cell] <= at.distance_m) continue;
+  const auto go_on = [=, &grid, &open](const Front& at) {
+    grid.for_neighbours(at.cell, [&](int cell) {
+      if (distances_m[cell] <= at.distance_m) return;
       Front to = at;
       to.cell = cell;
       const bool inside = places[cell] != Place::kOutside;
       const float z = depths_m[cell];
       if (z > 0) {
-        const float step = kStepShare * static_cast<float>(1 + at.hole);  // a hole may hide a slope
-        if (std::abs(z - at.depth_m) > step * std::max(z, 1.f)) continue;
+        if (!CellGrid::goes_on(at.depth_m, z, at.hole, kStepShare)) return;
         if (inside) to.origin_depth_m = z;
-        if (std::abs(z - to.origin_depth_m) > kLimbDepthM) continue;
+        if (std::abs(z - to.origin_depth_m) > kLimbDepthM) return;
         to.depth_m = z;
         to.hole = 0;
-      } else if (++to.hole > kLongestHole) {
-        continue;
+      } else if (++to.hole > CellGrid::kLongestHole) {
+        return;
       }
       if (!inside) {
         const float across_m = cell_share * to.depth_m, along_m = to.depth_m - at.depth_m;
@@ -98,7 +92,7 @@ void MoverReach::spread() {
       }
       if (to.distance_m < distances_m[cell] && to.distance_m <= reach_m)
         open[static_cast<std::size_t>(to.distance_m * kBucketsPerM)].push_back(to);
-    }
+    });
   };
   for (const int cell : cores_) {
     const float z = depths_m[cell];

@@ -9,8 +9,8 @@
 namespace semvslam {
 namespace {
 
-constexpr int kLongestHole = 4;  // cells without depth that a region may cross
-constexpr int kTakenHole = 1;    // of them it takes so many: beside a thing there is no depth in its projector's shadow
+// Of the cells without depth a region takes so many: beside a thing there is none in its projector's shadow.
+constexpr int kTakenHole = 1;
 
 struct Front {
   int cell;
@@ -94,23 +94,19 @@ cv::Mat grow_region(const CellGrid& grid, std::span<const GrowthSeed> seeds, std
     if (done[static_cast<std::size_t>(at.cell)]) continue;
     done[static_cast<std::size_t>(at.cell)] = 1;
     if (at.ours && at.hole <= kTakenHole) taken.data[at.cell] = 255;
-    const int c = at.cell % grid.columns, r = at.cell / grid.columns;
-    for (const auto& [dc, dr] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-      if (c + dc < 0 || r + dr < 0 || c + dc >= grid.columns || r + dr >= grid.rows) continue;
-      const int next = at.cell + dr * grid.columns + dc;
-      if (done[static_cast<std::size_t>(next)] || !allowed.data[next]) continue;
+    grid.for_neighbours(at.cell, [&](int next) {
+      if (done[static_cast<std::size_t>(next)] || !allowed.data[next]) return;
       const float z = grid.depth_m[static_cast<std::size_t>(next)];
       if (!(z > 0)) {  // holes are crossed, but are twice as far
-        if (at.hole < kLongestHole) open.push(cost + 2, {next, at.origin_depth_m, at.depth_m, at.hole + 1, at.ours});
-        continue;
+        if (at.hole < CellGrid::kLongestHole)
+          open.push(cost + 2, {next, at.origin_depth_m, at.depth_m, at.hole + 1, at.ours});
+        return;
       }
       const float origin = at.origin_depth_m > 0 ? at.origin_depth_m : z, last = at.depth_m > 0 ? at.depth_m : z;
-      // A hole may hide a slope.
-      const float step = static_cast<float>(limits.step_share * (1 + at.hole));
-      if (std::abs(z - last) > step * std::max(z, 1.f)) continue;
-      if (std::abs(z - origin) > static_cast<float>(limits.reach_m)) continue;
+      if (!CellGrid::goes_on(last, z, at.hole, static_cast<float>(limits.step_share))) return;
+      if (std::abs(z - origin) > static_cast<float>(limits.reach_m)) return;
       open.push(cost + 1, {next, origin, z, 0, at.ours});
-    }
+    });
   }
   return taken;
 }

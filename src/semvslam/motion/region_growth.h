@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <span>
 #include <vector>
@@ -32,6 +34,22 @@ struct CellGrid {
   CellGrid(const Camera& camera, const cv::Mat& depth);
   std::size_t size() const { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
   int cell_of(const cv::Point2f& pixel) const;
+  /// Calls visit(cell) for those to the right, left, below and above that there are, in this order.
+  template <typename Visit>
+  void for_neighbours(int cell, Visit&& visit) const {
+    const int c = cell % columns, r = cell / columns;
+    if (c + 1 < columns) visit(cell + 1);
+    if (c > 0) visit(cell - 1);
+    if (r + 1 < rows) visit(cell + columns);
+    if (r > 0) visit(cell - columns);
+  }
+  /// Cells without depth that a surface may go on behind.
+  static constexpr int kLongestHole = 4;
+  /// Whether a surface goes on from one measured cell to the next, `hole` cells without depth farther: a larger step
+  /// than `share` of the depth is an edge, but a hole may hide a slope.
+  static bool goes_on(float from_m, float to_m, int hole, float share) {
+    return std::abs(to_m - from_m) <= share * static_cast<float>(1 + hole) * std::max(to_m, 1.f);
+  }
   cv::Point2f centre(int cell) const {
     return {static_cast<float>(cell % columns * kCellPx) + 1.5f, static_cast<float>(cell / columns * kCellPx) + 1.5f};
   }
