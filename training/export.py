@@ -171,7 +171,7 @@ def about(net, state, out, size, int8):
             "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
             "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
             "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
-            "semantic_share": 0.5, "mask_threshold": 0.48, "gflops": cost.gflops(net, size),
+            "semantic_share": 0.35, "mask_threshold": 0.48, "gflops": cost.gflops(net, size),
             "training": {"steps": state["step"], "images_seen": state["seen"]}, "sha256": {f: sha(os.path.join(out, f)) for f in files}}
 
 

@@ -171,7 +171,7 @@ class OpenVino:
 
 
 class Segmenter:
-    def __init__(self, graphs, share=0.5, threshold=0.48, sizes=SIZES):
+    def __init__(self, graphs, share=0.35, threshold=0.48, sizes=SIZES):
         self.g, self.share, self.threshold = graphs, share, threshold
         H, W = graphs.size
         self.anchors = [anchors(i, H // s, W // s, sizes) for i, s in enumerate(STRIDES)]

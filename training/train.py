@@ -12,10 +12,11 @@ from datetime import datetime, timezone
 import torch
 import torch.distributed as dist
 
-from segnet import backbones, dataset, exported, losses, model
+from segnet import backbones, dataset, exported, losses, model, transplant
 
 
 EMA_EVERY = 4
+TRANSPLANT_BATCHES = 100
 STATISTICS_BATCHES = 24    # for batch normalisation, when the start weights come from exported graphs
 
 
@@ -27,7 +28,7 @@ def arguments():
                    help="more data of the same classes, and the share of all pictures that is to come from it")
     a.add_argument("--out", required=True, help="folder for check points and the log; an old check point there is continued")
     a.add_argument("--backbone", default="mobilenet_v2")
-    a.add_argument("--start", help="start weights of the backbone (.npz by torchvision's layer names)")
+    a.add_argument("--start", help="start weights of the backbone (.npz by torchvision's layer names); with --init, the rest is fitted to it")
     a.add_argument("--init", help="check point, or folder of exported graphs such as ../models, to start from (weights only)")
     a.add_argument("--until", help="UTC time of the day HH:MM to end at")
     a.add_argument("--minutes", type=float, default=60, help="how long, without --until")
@@ -70,13 +71,20 @@ def main():
         dist.init_process_group("gloo", f"tcp://127.0.0.1:{o.port}", rank=rank, world_size=o.processes)
     torch.manual_seed(o.seed)                              # same first weights everywhere
     net = model.MaskRcnn(o.backbone, len(data.names))
-    if o.start:
-        net.backbone.load_folded(o.start)
     if o.init and not state:
         if os.path.isdir(o.init):
             exported.load(net, o.init, data.names, itertools.islice(data, STATISTICS_BATCHES))
         else:
             net.load_state_dict(torch.load(o.init, weights_only=False)["ema"])
+    if o.start and not o.init:
+        net.backbone.load_folded(o.start)
+    elif o.start and not state:
+        shares = transplant.backbone(net, o.start, itertools.islice(data, TRANSPLANT_BATCHES))
+        if rank == 0:
+            print("new backbone; of the lateral convolutions' variance explained:", *(f"{s:.2f}" for s in shares), flush=True)
+    if o.processes > 1:                                    # fitted to batches that depend on the clock: one process's fit for all
+        for t in net.state_dict().values():
+            dist.broadcast(t, 0)
     net.backbone.freeze(o.freeze)
     net = net.to(memory_format=torch.channels_last)
     back = [p for p in net.backbone.parameters() if p.requires_grad]

@@ -75,7 +75,8 @@ Result<int> run_eval_seg(EvalSegArguments a) {
     fmt::print("ms per image, unsure objects included: mean {:.1f}, median {:.1f}, p95 {:.1f}\n", time.mean_ms,
                time.median_ms, time.p95_ms);
     if (const double g = (*segmenter)->gflops(); g > 0)
-      fmt::print("GFLOPs per image with 100 proposals and 5 masks (two operations a multiply-add): {:.2f}\n", g);
+      fmt::print("GFLOPs per image with {} proposals and {} masks (two operations a multiply-add): {:.2f}\n",
+                 Segmenter::kCostProposals, Segmenter::kCostMasks, g);
   }
   if (a.json.empty()) return static_cast<int>(kExitSuccess);
   if (const Status status = write_report(a.json, as_json(s, time, **segmenter).dump(1) + "\n"); !status)

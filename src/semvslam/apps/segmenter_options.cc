@@ -5,6 +5,7 @@
 namespace semvslam {
 
 void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
+  options.keep_up = false;  // no camera waits
   parser.add_option("--model", options.model, "folder with model.json (default: the network that comes along)");
   parser.add_option("--threads", options.threads, "threads of the network; 0: by machine, as beside tracking")
       ->capture_default_str()
@@ -17,7 +18,7 @@ void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
       ->check(CLI::IsMember({"auto", "f32", "int8"}));
   parser
       .add_option("--input-width", options.input_width_px,
-                  "of the image that the network sees, px; 0: by model and machine")
+                  "of the image that the network sees, px; 0: the model's")
       ->capture_default_str()
       ->check(CLI::Range(0, 4096));
 }

@@ -25,7 +25,7 @@ class NetworkSegmenter final : public Segmenter {
 
   Result<Segmentation> segment(const SegmentationRequest& request) override;
   const std::vector<std::string>& class_names() const override { return model_.classes; }
-  double gflops() const override { return model_.gflops.of_image(NetworkGraphs::kBoxBatch, 5); }
+  double gflops() const override { return model_.gflops.of_image(kCostProposals, kCostMasks); }
   std::string description() const override { return graphs_->description(); }
 
  private:

@@ -22,7 +22,7 @@ class NoSegmenter final : public Segmenter {
   std::vector<std::string> names_;
 };
 
-constexpr double kSlowMachineWidth = 0.8;  // of the model's input: two thirds of the time; persons near by lose nothing
+constexpr double kSlowMachineWidth = 0.7;  // of the model's input: half the time; persons near by lose little by it
 
 struct Settled {
   std::string precision;
@@ -38,7 +38,7 @@ Settled settle(const SegmenterOptions& options, bool openvino, ModelDescription&
   int width_px = options.input_width_px;
   if (slow && options.precision == "auto") {
     out.precision = model.trunk_int8.empty() ? "f32" : "int8";
-    if (width_px == 0) width_px = static_cast<int>(kSlowMachineWidth * model.input.width);
+    if (width_px == 0 && options.keep_up) width_px = static_cast<int>(kSlowMachineWidth * model.input.width);
   }
   if (width_px > 0) model.set_input_width(width_px);
   return out;
@@ -78,7 +78,7 @@ void SegmenterOptions::add_to(ConfigSchema& schema) {
   schema.add(
       "segment.input_width_px", &input_width_px, {0, 4096},
       "width of the image that the network sees: more finds smaller persons, less is faster; 0 = the model's, or "
-      "four fifths of it on processors without 16-bit floats, px");
+      "seven tenths of it on processors without 16-bit floats, px");
   schema.add("segment.mask_folder", &mask_folder, {}, "folder of masks (PNG), for source = folder");
   schema.add("segment.score", &score, {0.01, 1.0}, "least score of an object");
   schema.add("segment.threads", &threads, {0, 64},

@@ -34,7 +34,8 @@ class Segmenter {
   /// An image without any object is a Segmentation without instances.
   virtual Result<Segmentation> segment(const SegmentationRequest& request) = 0;
   virtual const std::vector<std::string>& class_names() const = 0;
-  /// 10^9 operations (two to a multiply-add) of an image with 100 proposals and 5 masks; 0 = none or not known.
+  /// 10^9 operations (two to a multiply-add) of an image with so many proposals and masks; 0 = none or not known.
+  static constexpr int kCostProposals = 100, kCostMasks = 5;
   virtual double gflops() const { return 0; }
   /// One line for logs.
   virtual std::string description() const = 0;
@@ -45,7 +46,8 @@ struct SegmenterOptions {
   std::string model;               // folder of the network's model.json; empty: the one that comes with semvslam
   std::string backend = "auto";    // auto, openvino, opencv
   std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere; int8: eight bits
-  int input_width_px = 0;          // of the image that the network sees; 0 = by model and machine
+  int input_width_px = 0;          // of the image that the network sees; 0 = the model's
+  bool keep_up = true;             // with a camera: by default slow machines see a smaller image than the model's
   std::string mask_folder;         // of source `folder`
   double score = 0.6;              // least score of an instance
   int threads = 2;                 // of the network; 0 = what suits the machine beside tracking
