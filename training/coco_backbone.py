@@ -6,7 +6,7 @@ depth-wise convolutions, whose factor is a tensor of its own. Written: `.npz` by
 """
 import argparse
 import json
-import os
+import pathlib
 import sys
 
 import numpy as np
@@ -17,11 +17,9 @@ BLOCKS = 17
 
 def tensors(folder):
     """Every float32 tensor by its name."""
-    with open(os.path.join(folder, "model.json")) as f:
-        manifest = json.load(f)["weightsManifest"]
     stored = {}
-    for group in manifest:
-        data = b"".join(open(os.path.join(folder, p), "rb").read() for p in group["paths"])
+    for group in json.loads((folder / "model.json").read_text())["weightsManifest"]:
+        data = b"".join((folder / p).read_bytes() for p in group["paths"])
         place = 0
         for w in group["weights"]:
             if "quantization" in w:
@@ -57,7 +55,7 @@ def layers():
 
 def main():
     a = argparse.ArgumentParser(description=__doc__)
-    a.add_argument("folder", help="of model.json and its shards")
+    a.add_argument("folder", type=pathlib.Path, help="of model.json and its shards")
     a.add_argument("out", help=".npz to write")
     o = a.parse_args()
     try:

@@ -141,7 +141,10 @@ def quantise(out, pictures):
     # The last 1x1 convolutions are cheap, and coarse steps in scores and box sizes cost accuracy.
     last = [n.get_friendly_name() for n in m.get_ops() if n.get_type_name() == "Convolution"
             and any(p in n.get_friendly_name() for p in ("objectness", "deltas", "semantic"))]
-    q = nncf.quantize(m, nncf.Dataset(pictures), subset_size=len(pictures), ignored_scope=nncf.IgnoredScope(names=last))
+    # Weights of seven bits: processors without VNNI, which this trunk is for, add pairs of products in 16 bits, and eight overflow.
+    narrow = nncf.AdvancedQuantizationParameters(overflow_fix=nncf.OverflowFix.ENABLE)
+    q = nncf.quantize(m, nncf.Dataset(pictures), subset_size=len(pictures), ignored_scope=nncf.IgnoredScope(names=last),
+                      advanced_parameters=narrow)
     ov.save_model(q, os.path.join(out, TRUNK_INT8), compress_to_fp16=True)
 
 
@@ -171,7 +174,7 @@ def about(net, state, out, size, int8):
             "input": {"height": size[0], "width": size[1], "channels": "RGB", "range": [-1, 1], "pad": 127}, "classes": state["names"],
             "strides": boxes.STRIDES, "anchor_sizes": boxes.SIZES, "anchor_ratios": boxes.RATIOS, "box_weights": boxes.BOX_WEIGHTS,
             "box_levels": boxes.BOX_LEVELS, "mask_levels": boxes.MASK_LEVELS, "feature_channels": model.CHANNELS,
-            "semantic_share": 0.35, "mask_threshold": 0.48, "gflops": cost.gflops(net, size),
+            "semantic_share": infer.SEMANTIC_SHARE, "mask_threshold": infer.MASK_THRESHOLD, "gflops": cost.gflops(net, size),
             "training": {"steps": state["step"], "images_seen": state["seen"]}, "sha256": {f: sha(os.path.join(out, f)) for f in files}}
 
 

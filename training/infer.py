@@ -22,6 +22,7 @@ BOX_LEVELS, MASK_LEVELS = (112.0, 336.0), (224.0,)
 GREY = 127
 PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
+SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.48     # of persons' masks
 
 
 def size_of(text):
@@ -171,7 +172,7 @@ class OpenVino:
 
 
 class Segmenter:
-    def __init__(self, graphs, share=0.35, threshold=0.48, sizes=SIZES):
+    def __init__(self, graphs, share=SEMANTIC_SHARE, threshold=MASK_THRESHOLD, sizes=SIZES):
         self.g, self.share, self.threshold = graphs, share, threshold
         H, W = graphs.size
         self.anchors = [anchors(i, H // s, W // s, sizes) for i, s in enumerate(STRIDES)]

@@ -69,20 +69,19 @@ def main():
         rank += 1
     if o.processes > 1:
         dist.init_process_group("gloo", f"tcp://127.0.0.1:{o.port}", rank=rank, world_size=o.processes)
-    torch.manual_seed(o.seed)                              # same first weights everywhere
+    torch.manual_seed(o.seed)                              # of the first weights
     net = model.MaskRcnn(o.backbone, len(data.names))
-    if o.init and not state:
-        if os.path.isdir(o.init):
+    if rank == 0 and not state:
+        if o.init and os.path.isdir(o.init):
             exported.load(net, o.init, data.names, itertools.islice(data, STATISTICS_BATCHES))
-        else:
+        elif o.init:
             net.load_state_dict(torch.load(o.init, weights_only=False)["ema"])
-    if o.start and not o.init:
-        net.backbone.load_folded(o.start)
-    elif o.start and not state:
-        shares = transplant.backbone(net, o.start, itertools.islice(data, TRANSPLANT_BATCHES))
-        if rank == 0:
+        if o.start and o.init:
+            shares = transplant.backbone(net, o.start, itertools.islice(data, TRANSPLANT_BATCHES))
             print("new backbone; of the lateral convolutions' variance explained:", *(f"{s:.2f}" for s in shares), flush=True)
-    if o.processes > 1:                                    # fitted to batches that depend on the clock: one process's fit for all
+        elif o.start:
+            net.backbone.load_folded(o.start)
+    if o.processes > 1:                                    # the same for all: what was fitted depends on the clock
         for t in net.state_dict().values():
             dist.broadcast(t, 0)
     net.backbone.freeze(o.freeze)
