@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 
 #include "semvslam/geometry/depth_image.h"
@@ -10,6 +11,12 @@ namespace semvslam {
 namespace {
 
 constexpr float kLeastShare = 0.02f;  // of the window that must be thing with depth, to say how far away it is
+
+/// The first x >= `from` whose value is 255, or `end`.
+int next_set(const std::uint8_t* row, int from, int end) {
+  const void* at = std::memchr(row + from, 255, static_cast<std::size_t>(end - from));
+  return at != nullptr ? static_cast<int>(static_cast<const std::uint8_t*>(at) - row) : end;
+}
 
 }  // namespace
 
@@ -25,18 +32,12 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
   const cv::Rect window = cv::Rect(cv::Point(set.x / 2 - room, set.y / 2 - room),
                                    cv::Point((set.br().x + 1) / 2 + room, (set.br().y + 1) / 2 + room)) &
                           image;
-  cv::Mat thing(window.size(), CV_8UC1), depth_m(window.size(), CV_32FC1), inside_m(window.size(), CV_32FC1),
-      inside(window.size(), CV_32FC1);
+  const cv::Mat depth_m = half_depth_m(depth, metres_per_unit, window);
+  cv::Mat thing(window.size(), CV_8UC1), inside_m(window.size(), CV_32FC1), inside(window.size(), CV_32FC1);
   for (int y = 0; y < window.height; ++y) {
-    const int from_y = 2 * (window.y + y);
-    const std::uint8_t* from = mask.ptr<std::uint8_t>(from_y);
+    const std::uint8_t* from = mask.ptr<std::uint8_t>(2 * (window.y + y)) + 2 * window.x;
     std::uint8_t* things = thing.ptr<std::uint8_t>(y);
-    float* depths = depth_m.ptr<float>(y);
-    for (int x = 0; x < window.width; ++x) {
-      const int from_x = 2 * (window.x + x);
-      things[x] = from[from_x] != 0 ? 255 : 0;
-      depths[x] = depth_at_m(depth, metres_per_unit, from_x, from_y);
-    }
+    for (int x = 0; x < window.width; ++x) things[x] = from[2 * x] != 0 ? 255 : 0;
   }
   // The thing's own depth comes from its core: the rim of a mask may lie on what is behind it.
   cv::Mat core, widest;
@@ -55,13 +56,13 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
   }
   cv::boxFilter(inside, inside, -1, {side, side});
   cv::boxFilter(inside_m, inside_m, -1, {side, side});
+  cv::Mat band;
+  cv::bitwise_xor(widest, core, band);  // the core lies within
   for (int y = 0; y < window.height; ++y) {
-    const std::uint8_t *cores = core.ptr<std::uint8_t>(y), *widests = widest.ptr<std::uint8_t>(y),
-                       *things = thing.ptr<std::uint8_t>(y);
+    const std::uint8_t *bands = band.ptr<std::uint8_t>(y), *things = thing.ptr<std::uint8_t>(y);
     const float *depths = depth_m.ptr<float>(y), *shares = inside.ptr<float>(y), *metres = inside_m.ptr<float>(y);
     const int to_y = 2 * (window.y + y), end_y = std::min(to_y + 2, mask.rows);
-    for (int x = 0; x < window.width; ++x) {
-      if (widests[x] == 0 || cores[x] != 0) continue;
+    for (int x = next_set(bands, 0, window.width); x < window.width; x = next_set(bands, x + 1, window.width)) {
       if (depths[x] <= 0 || shares[x] < kLeastShare) continue;
       const bool belongs = std::abs(depths[x] - metres[x] / shares[x]) < static_cast<float>(options.tolerance_m);
       if (belongs == (things[x] != 0)) continue;

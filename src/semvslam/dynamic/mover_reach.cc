@@ -90,8 +90,9 @@ void MoverReach::spread() {
         const float across_m = cell_share * to.depth_m, along_m = to.depth_m - at.depth_m;
         to.distance_m += std::sqrt(across_m * across_m + along_m * along_m);
       }
-      if (to.distance_m < distances_m[cell] && to.distance_m <= reach_m)
-        open[static_cast<std::size_t>(to.distance_m * kBucketsPerM)].push_back(to);
+      if (to.distance_m >= distances_m[cell] || to.distance_m > reach_m) return;
+      distances_m[cell] = to.distance_m;
+      open[static_cast<std::size_t>(to.distance_m * kBucketsPerM)].push_back(to);
     });
   };
   for (const int cell : cores_) {
@@ -100,10 +101,8 @@ void MoverReach::spread() {
   }
   for (std::size_t bucket = 0; bucket < open.size(); ++bucket)
     for (std::size_t next = 0; next < open[bucket].size(); ++next) {
-      const Front at = open[bucket][next];  // a copy: the bucket may grow
-      if (distances_m[at.cell] <= at.distance_m) continue;
-      distances_m[at.cell] = at.distance_m;
-      go_on(at);
+      const Front at = open[bucket][next];                   // a copy: the bucket may grow
+      if (at.distance_m <= distances_m[at.cell]) go_on(at);  // else a shorter way has been found since
     }
 }
 

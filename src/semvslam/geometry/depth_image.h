@@ -14,4 +14,8 @@ inline float depth_at_m(const cv::Mat& depth, float metres_per_unit, int x, int 
   return d > 0.f && d < 1e6f ? d : 0.f;  // NaN fails both
 }
 
+/// Every second pixel of every second row, as depth_at_m gives them. @param window in pixels of the half-size image,
+/// (width + 1) / 2 by (height + 1) / 2, inside it. @return CV_32FC1 of the window's size, m
+cv::Mat half_depth_m(const cv::Mat& depth, float metres_per_unit, const cv::Rect& window);
+
 }  // namespace semvslam

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace semvslam {
 namespace {
@@ -45,6 +47,41 @@ struct Normalization {
   }
 };
 
+Vector9 constraint(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  Vector9 row;
+  row << b.x() * a.x(), b.x() * a.y(), b.x(), b.y() * a.x(), b.y() * a.y(), b.y(), a.x(), a.y(), 1;
+  return row;
+}
+
+// The nine elements of F, row by row, that eight pairs allow: what is orthogonal to all their constraints. A tenth of
+// the time of the least squares, which samples of a RANSAC would spend most of theirs in. None: not unique.
+std::optional<Vector9> exact_solution(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vector2d> b,
+                                      const Normalization& normal_a, const Normalization& normal_b) {
+  Eigen::Matrix<double, 9, 8> constraints;
+  for (int i = 0; i < 8; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    constraints.col(i) = constraint(normal_a(a[k]), normal_b(b[k]));
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 8>> qr(constraints);
+  const double largest = qr.matrixR()(0, 0), smallest = qr.matrixR()(7, 7);
+  if (!(smallest * smallest > kSmallestShare * largest * largest)) return std::nullopt;
+  return Vector9(qr.householderQ() * Vector9::Unit(8));
+}
+
+// Of more than eight pairs.
+std::optional<Vector9> least_squares(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vector2d> b,
+                                     const Normalization& normal_a, const Normalization& normal_b) {
+  Matrix9 normal = Matrix9::Zero();
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Vector9 row = constraint(normal_a(a[i]), normal_b(b[i]));
+    normal += row * row.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix9> eigen(normal);
+  const Vector9 values = eigen.eigenvalues();
+  if (eigen.info() != Eigen::Success || !(values[1] > kSmallestShare * values[8])) return std::nullopt;
+  return Vector9(eigen.eigenvectors().col(0));
+}
+
 }  // namespace
 
 Eigen::Matrix3d fundamental_from_pose(const Camera& camera_a, const Camera& camera_b, const SE3& b_from_a) {
@@ -62,18 +99,10 @@ Result<Eigen::Matrix3d> fundamental_eight_point(std::span<const Eigen::Vector2d>
   const Normalization normal_a(pixels_a), normal_b(pixels_b);
   if (!(normal_a.scale > 0) || !(normal_b.scale > 0)) return refuse("all pixels are in one place");
 
-  Matrix9 normal = Matrix9::Zero();
-  for (std::size_t i = 0; i < pixels_a.size(); ++i) {
-    const Eigen::Vector2d a = normal_a(pixels_a[i]), b = normal_b(pixels_b[i]);
-    Vector9 row;
-    row << b.x() * a.x(), b.x() * a.y(), b.x(), b.y() * a.x(), b.y() * a.y(), b.y(), a.x(), a.y(), 1;
-    normal += row * row.transpose();
-  }
-  const Eigen::SelfAdjointEigenSolver<Matrix9> eigen(normal);
-  const Vector9 values = eigen.eigenvalues();
-  if (eigen.info() != Eigen::Success || !(values[1] > kSmallestShare * values[8]))
-    return refuse("the pairs allow many solutions (one line, one plane or no parallax)");
-  const Vector9 f = eigen.eigenvectors().col(0);
+  const std::optional<Vector9> solution = pixels_a.size() == 8 ? exact_solution(pixels_a, pixels_b, normal_a, normal_b)
+                                                               : least_squares(pixels_a, pixels_b, normal_a, normal_b);
+  if (!solution) return refuse("the pairs allow many solutions (one line, one plane or no parallax)");
+  const Vector9& f = *solution;
   Eigen::Matrix3d m;
   m << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -96,6 +96,13 @@ TEST(Epipolar, RefusesWhatDoesNotDetermineIt) {
     line_b.emplace_back(10 * i + 3, 7 * i);
   }
   EXPECT_FALSE(fundamental_eight_point(line_a, line_b).ok());
+  // The same of eight, which are solved another way.
+  const auto first_eight = [](const Pixels& pixels) { return Pixels(pixels.begin(), pixels.begin() + 8); };
+  EXPECT_FALSE(fundamental_eight_point(first_eight(line_a), first_eight(line_b)).ok());
+  EXPECT_FALSE(fundamental_eight_point(first_eight(images.a), first_eight(images.a)).ok());
+  Pixels twice_a = first_eight(images.a), twice_b = first_eight(images.b);
+  twice_a[7] = twice_a[0], twice_b[7] = twice_b[0];
+  EXPECT_FALSE(fundamental_eight_point(twice_a, twice_b).ok());
   Pixels nan = images.b;
   nan[3].x() = std::numeric_limits<double>::quiet_NaN();
   const auto result = fundamental_eight_point(images.a, nan);

@@ -1,7 +1,7 @@
 #include "semvslam/motion/fundamental.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 
@@ -41,24 +41,34 @@ struct HomographyProblem {
   double scale = 1;
 
   std::size_t size() const { return a.size(); }
-  template <typename Indices>
-  Model fit(const Indices& indices) const {
-    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-    for (const std::size_t i : indices) {
-      const Eigen::Vector2d p = scale * (a[i] - centre), q = scale * (b[i] - centre);
-      Eigen::Matrix<double, 9, 1> row_x, row_y;
-      row_x << p.x(), p.y(), 1, 0, 0, 0, -q.x() * p.x(), -q.x() * p.y(), -q.x();
-      row_y << 0, 0, 0, p.x(), p.y(), 1, -q.y() * p.x(), -q.y() * p.y(), -q.y();
-      normal += row_x * row_x.transpose() + row_y * row_y.transpose();
-    }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(normal);
-    const auto h = eigen.eigenvectors().col(0);
+  // The two constraints of a pair on the nine elements, row by row.
+  Eigen::Matrix<double, 9, 2> constraints(std::size_t i) const {
+    const Eigen::Vector2d p = scale * (a[i] - centre), q = scale * (b[i] - centre);
+    Eigen::Matrix<double, 9, 2> rows;
+    rows.col(0) << p.x(), p.y(), 1, 0, 0, 0, -q.x() * p.x(), -q.x() * p.y(), -q.x();
+    rows.col(1) << 0, 0, 0, p.x(), p.y(), 1, -q.y() * p.x(), -q.y() * p.y(), -q.y();
+    return rows;
+  }
+  static Model of(const Eigen::Matrix<double, 9, 1>& h) {
     Model m;
     m << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8];
     return m;
   }
+  Model fit(const std::vector<std::size_t>& indices) const {
+    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
+    for (const std::size_t i : indices) {
+      const auto rows = constraints(i);
+      normal += rows * rows.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(normal);
+    return of(eigen.eigenvectors().col(0));
+  }
+  // Four pairs are met exactly: by what is orthogonal to all their constraints.
   void hypotheses(const std::array<std::size_t, kSampleSize>& sample, std::vector<Model>& out) const {
-    out.push_back(fit(sample));
+    Eigen::Matrix<double, 9, 8> all;
+    for (int k = 0; k < kSampleSize; ++k) all.middleCols<2>(2 * k) = constraints(sample[static_cast<std::size_t>(k)]);
+    const Eigen::HouseholderQR<Eigen::Matrix<double, 9, 8>> qr(all);
+    out.push_back(of(qr.householderQ() * Eigen::Matrix<double, 9, 1>::Unit(8)));
   }
   double squared_residual(const Model& h, std::size_t i) const {
     const Eigen::Vector2d p = scale * (a[i] - centre), q = scale * (b[i] - centre);

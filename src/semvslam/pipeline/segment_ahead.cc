@@ -1,16 +1,16 @@
 #include "semvslam/pipeline/segment_ahead.h"
 
-#include <algorithm>
+#include <stdexcept>
 
 #include "semvslam/base/thread_priority.h"
 
 namespace semvslam {
 
 SegmentAhead::SegmentAhead(FrameSource& source, Segment segment, std::size_t at_once, std::size_t capacity)
-    : source_(source), segment_(std::move(segment)), items_(capacity + std::max<std::size_t>(1, at_once)) {
+    : source_(source), segment_(std::move(segment)), items_(capacity + at_once) {
+  if (at_once == 0) throw std::invalid_argument("segment ahead: nobody to segment");
   if (!segment_) return;
-  do threads_.emplace_back([this] { work(); });
-  while (threads_.size() < at_once);
+  while (threads_.size() < at_once) threads_.emplace_back([this] { work(); });
 }
 
 SegmentAhead::~SegmentAhead() { items_.close(); }

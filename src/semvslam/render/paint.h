@@ -56,5 +56,8 @@ cv::Mat paint_label(cv::Size size, std::uint64_t seed);
 
 /// A saturated colour of a hue in [0, 1), BGR 0..255.
 cv::Vec3f hue_colour(double hue, double saturation, double value);
+/// A pixel of an image of that size. Its two numbers are drawn one by one, not in the arguments of one call: their
+/// order would differ from compiler to compiler.
+cv::Point any_place(RandomStream& random, int width, int height);
 
 }  // namespace semvslam::render

@@ -22,12 +22,6 @@ cv::Scalar any_colour(RandomStream& random, double saturation, double low, doubl
   return scalar(hue_colour(random.uniform(), 0.75 * strength, value));
 }
 
-/// Numbers are drawn one by one, never two in the arguments of one call: their order differs from compiler to compiler.
-cv::Point any_place(RandomStream& random, int width, int height) {
-  const int y = random.below(height);
-  return {random.below(width), y};
-}
-
 /// A word of random letters; syllables, so that word shapes look like writing.
 std::string word(RandomStream& random) {
   static const char* const kSyllables[] = {"ka", "lo", "ven", "ta", "ri",  "mo", "sel", "du",  "on", "pra",

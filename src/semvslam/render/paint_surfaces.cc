@@ -27,6 +27,11 @@ cv::Mat paint(cv::Size size, Pixel&& pixel) {
 
 }  // namespace
 
+cv::Point any_place(RandomStream& random, int width, int height) {
+  const int y = random.below(height);
+  return {random.below(width), y};
+}
+
 cv::Vec3f hue_colour(double hue, double saturation, double value) {
   auto channel = [&](double n) {
     const double k = std::fmod(n + hue * 6.0, 6.0);
@@ -215,8 +220,7 @@ cv::Mat paint_wallpaper(cv::Size size, std::uint64_t seed) {
   });
   const int ornaments = size.area() / 5200;
   for (int i = 0; i < ornaments; ++i) {
-    const int y = random.below(size.height);
-    const cv::Point at(random.below(size.width), y);
+    const cv::Point at = any_place(random, size.width, size.height);
     const double r = random.uniform(4, 17);
     const double value = random.uniform(0.35, 0.75);
     const cv::Vec3f c = hue_colour(std::fmod(hue + random.uniform(0.3, 0.7), 1.0), 0.45, value);

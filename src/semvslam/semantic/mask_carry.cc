@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "semvslam/data/frame.h"
+#include "semvslam/geometry/depth_image.h"
 #include "semvslam/semantic/mask_motion.h"
 
 namespace semvslam {
@@ -194,16 +194,7 @@ CarryFrame::CarryFrame(const Camera& camera, cv::Mat gray, cv::Mat depth)
 const cv::Mat& CarryFrame::half_depth_m() const {
   cv::Mat& half = cache_->half_depth_m;
   if (!half.empty() || depth_.empty()) return half;
-  half.create(half_size(), CV_32FC1);
-  for (int y = 0; y < half.rows; ++y) {
-    float* to = half.ptr<float>(y);
-    if (depth_.type() == CV_16UC1) {
-      const std::uint16_t* from = depth_.ptr<std::uint16_t>(2 * y);
-      for (int x = 0; x < half.cols; ++x) to[x] = static_cast<float>(from[2 * x]) * metres_per_unit_;
-    } else {
-      for (int x = 0; x < half.cols; ++x) to[x] = depth_at_m(depth_, metres_per_unit_, 2 * x, 2 * y);
-    }
-  }
+  half = semvslam::half_depth_m(depth_, metres_per_unit_, cv::Rect({}, half_size()));
   return half;
 }
 

@@ -129,6 +129,29 @@ TEST(SegmentationRepair, WhatWasSeenOnceOnlyIsNotRestored) {
   EXPECT_EQ(f.feed(f.scene.view(1, {kWalker}), nullptr).record.restored_instances, 0);
 }
 
+TEST(SegmentationRepair, SecondMaskOfOneObjectIsNotMissed) {
+  Feeder f(in_mode("carry"));
+  const auto with_second = [&](const TestView& view) {
+    Segmentation s = view.truth;
+    Instance second = s.instances[0];  // the same person and the furniture around her
+    const cv::Rect first = second.window;
+    second.window = cv::Rect(first.x - 30, first.y - 30, first.width + 60, first.height + 60);
+    second.mask = cv::Mat(second.window.size(), CV_8UC1, cv::Scalar(255));
+    second.box = cv::Rect2f(second.window);
+    second.id = InstanceId(1);
+    s.instances.push_back(second);
+    return s;
+  };
+  for (int i = 0; i < 4; ++i) {
+    const TestView view = f.scene.view(i, {kWalker});
+    const Segmentation given = with_second(view);
+    ASSERT_EQ(f.feed(view, &given).segmentation.instances.size(), 2u);
+  }
+  const RepairedSegmentation one = f.feed(f.scene.view(4, {kWalker}));
+  EXPECT_EQ(one.record.restored_instances, 0);
+  EXPECT_EQ(one.segmentation.instances.size(), 1u);
+}
+
 TEST(SegmentationRepair, CarryingEndsAfterTheGivenNumberOfFrames) {
   RepairOptions o = in_mode("carry");
   o.memory.longest_carry = 4;
