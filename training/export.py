@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Check point -> three ONNX graphs (trunk, box head, mask head), model.json, and the trunk in INT8 where wanted.
 
-usage: export.py CHECKPOINT OUT_DIR [--size 480x640] [--int8 COCO_JSON IMAGES]
+usage: export.py CHECKPOINT OUT_DIR [--average CHECKPOINT ...] [--size 480x640] [--int8 COCO_JSON IMAGES]
 """
 import argparse
 import hashlib
@@ -68,10 +68,14 @@ TRUNK_INT8 = "trunk.int8.xml"       # its weights are beside it in trunk.int8.bi
 TRUNK_OUT = ["p3", "p4", "p5", "objectness3", "objectness4", "objectness5", "deltas3", "deltas4", "deltas5", "semantic"]
 
 
-def load(path):
+def load(path, *earlier):
+    """Of several check points of one training the mean of the weights (Izmailov et al., Averaging weights leads to wider optima and
+    better generalization, UAI 2018), with the state of the first."""
     state = torch.load(path, map_location="cpu", weights_only=False)
+    sets = [state["ema"]] + [torch.load(p, map_location="cpu", weights_only=False)["ema"] for p in earlier]
+    mean = {k: sum(s[k] for s in sets) / len(sets) if v.is_floating_point() else v for k, v in sets[0].items()}
     net = model.MaskRcnn(state["backbone"], len(state["names"]))
-    net.load_state_dict(state["ema"])
+    net.load_state_dict(mean)
     return fuse(net.eval()).requires_grad_(False), state
 
 
@@ -182,12 +186,13 @@ def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("checkpoint")
     a.add_argument("out")
+    a.add_argument("--average", nargs="+", default=[], metavar="CHECKPOINT", help="earlier runs' ends, to average the weights with")
     a.add_argument("--size", default="480x640")
     a.add_argument("--int8", nargs=2, metavar=("COCO_JSON", "IMAGES"))
     o = a.parse_args()
     os.makedirs(o.out, exist_ok=True)
     size = infer.size_of(o.size)
-    net, state = load(o.checkpoint)
+    net, state = load(o.checkpoint, *o.average)
     write_onnx(net, o.out, size)
     for name in ("trunk", "box", "mask"):
         round_weights(os.path.join(o.out, name + ".onnx"))
