@@ -53,8 +53,8 @@ Vector9 constraint(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return row;
 }
 
-// The nine elements of F, row by row, that eight pairs allow: what is orthogonal to all their constraints. A RANSAC would
-// spend most of its time in least squares over its samples of eight. None: not unique.
+// The nine elements of F, row by row, that eight pairs allow: what is orthogonal to all their constraints. A RANSAC
+// would spend most of its time in least squares over its samples of eight. None: not unique.
 std::optional<Vector9> exact_solution(std::span<const Eigen::Vector2d> a, std::span<const Eigen::Vector2d> b,
                                       const Normalization& normal_a, const Normalization& normal_b) {
   Eigen::Matrix<double, 9, 8> constraints;
