@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <span>
 
 namespace semvslam {
 namespace {
@@ -83,11 +84,11 @@ void place(const cv::Rect& window, const cv::Mat& mask, Instance& out) {
   out.box = cv::Rect2f(window);
 }
 
-/// Takes from a mask what lies in another or next to it. @return pixels left
-int subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int margin_px) {
+/// Takes from a mask what lies in another or next to it.
+void subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int margin_px) {
   const cv::Rect room(-margin_px, -margin_px, 2 * margin_px, 2 * margin_px);
   const cv::Rect common = window & cv::Rect(other.window.tl() + room.tl(), other.window.size() + room.size());
-  if (common.empty()) return cv::countNonZero(mask);
+  if (common.empty()) return;
   cv::Mat covered = cv::Mat::zeros(window.size(), CV_8UC1);
   if (const cv::Rect both = window & other.window; !both.empty())
     other.mask(both - other.window.tl()).copyTo(covered(both - window.tl()));
@@ -95,6 +96,12 @@ int subtract(const cv::Rect& window, cv::Mat& mask, const Instance& other, int m
     cv::dilate(covered, covered,
                cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * margin_px + 1, 2 * margin_px + 1)));
   mask.setTo(0, covered);
+}
+
+/// Takes from a mask what lies in any of the instances that may move, or next to it. @return pixels left
+int subtract_movers(const cv::Rect& window, cv::Mat& mask, std::span<const Instance> instances, int margin_px) {
+  for (const Instance& other : instances)
+    if (other.role == Role::kDynamic) subtract(window, mask, other, margin_px);
   return cv::countNonZero(mask);
 }
 
@@ -187,6 +194,8 @@ struct InstanceMemory::Step {
   std::vector<bool> found;            // per track
   MemoryReport report;
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+  std::span<const Instance> given() const { return std::span(segmentation.instances).first(segmented); }
 };
 
 MemoryReport InstanceMemory::step(const CarryFrame& present, const std::optional<SE3>& cur_from_prev, bool lacking,
@@ -311,11 +320,8 @@ bool InstanceMemory::extend(Step& step, Track& track, Instance& now) {
   const Overlap agreement = overlap(carried.window, carried.mask, {}, now.window, now.mask);
   if (agreement.both < kLeastAgreement * agreement.second) return false;
   cv::Mat missing = carried.mask.clone();
-  for (std::size_t i = 0; i < step.segmented; ++i)
-    if (step.segmentation.instances[i].role == Role::kDynamic)
-      subtract(carried.window, missing, step.segmentation.instances[i], kGapPx);
   const int least = std::max(options_.least_px / 2, static_cast<int>(options_.least_limb * track.whole_px));
-  if (cv::countNonZero(missing) < least) return false;
+  if (subtract_movers(carried.window, missing, step.given(), kGapPx) < least) return false;
   cv::morphologyEx(missing, missing, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, cv::Size(5, 5)));
   if (!keep_lost_parts(carried.window, missing, now, step.present.half_depth_m(), least)) return false;
   // Back to where the segmented part ends.
@@ -344,17 +350,13 @@ bool InstanceMemory::restore(Step& step, Track& track) {
   if (track.hidden) ++track.carried;
   if (carried.outcome != CarryOutcome::kVisible) return track.hidden;
   // Two masks of one object, the larger one often with furniture in it: with one of them here, nothing is missing.
-  for (std::size_t i = 0; i < step.segmented; ++i) {
-    const Instance& other = step.segmentation.instances[i];
+  for (const Instance& other : step.given()) {
     if (other.class_name != track.whole.class_name) continue;
     const Overlap o = overlap(carried.window, carried.mask, {}, other.window, other.mask);
     if (o.second > 0 && o.both >= kHeld * o.second) return false;
   }
   const int carried_px = cv::countNonZero(carried.mask);
-  int left = carried_px;
-  for (std::size_t i = 0; i < step.segmented; ++i)
-    if (step.segmentation.instances[i].role == Role::kDynamic)
-      left = subtract(carried.window, carried.mask, step.segmentation.instances[i], 0);
+  const int left = subtract_movers(carried.window, carried.mask, step.given(), 0);
   if (left < options_.least_px || left < kMerged * carried_px) return false;
   // What fades at the border is leaving, not missed.
   if (at_border(carried.window, step.segmentation.size) && carried.inside < 0.5 && track.carried > 0) return false;
