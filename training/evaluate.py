@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Scores exported graphs (or a check point): COCO mask AP, person pixels, near persons; composed sequences.
 
-usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--sequence DIR ...] [--score 0.5] [--json OUT]
+usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--sequence DIR ...] [--score 0.45] [--json OUT]
 """
 import argparse
 import contextlib
@@ -156,7 +156,7 @@ def main():
     a.add_argument("--coco", nargs=2, metavar=("JSON", "IMAGES"))
     a.add_argument("--sequence", nargs="*", default=[])
     a.add_argument("--step", type=int, default=5, help="every so many frames of a sequence")
-    a.add_argument("--score", type=float, default=0.5)
+    a.add_argument("--score", type=float, default=infer.SURE)
     a.add_argument("--size", help="of the network's input, height x width; default: as exported, 480x640 for a check point")
     a.add_argument("--int8", action="store_true", help="the trunk in INT8")
     a.add_argument("--json")

@@ -48,7 +48,7 @@ def formulas():
     prob = ((np.add.outer(np.arange(28) * 13, np.arange(28) * 7) % 29) / 28).astype(np.float32)
     (x0, y0, window), _ = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120))
     hint = (((np.arange(48)[:, None] * 5 + np.arange(64)[None] * 3) % 17) / 16).astype(np.float32)
-    (_, _, mixed), support = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120), 0.48, hint, (2.0, 2.5), 0.5)
+    (_, _, mixed), certainty = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120), 0.48, hint, (2.0, 2.5), 0.5)
     nb = np.array([[i * 7 % 50, i * 13 % 40, i * 7 % 50 + 30 + i % 5, i * 13 % 40 + 25 + i % 7] for i in range(40)], np.float32)
     ns = np.array([(i * 29 % 41) / 41 for i in range(40)], np.float32)
     ref = np.array([[10, 20, 60, 90], [0, 0, 500, 380]], np.float32)
@@ -60,7 +60,7 @@ def formulas():
             "paste": {"box": [-7.3, 20.6, 50.2, 99.5], "height": 90, "width": 120, "x0": x0, "y0": y0, "w": window.shape[1], "h": window.shape[0],
                       "row_counts": window.sum(1).tolist(),
                       "mixed": {"about": "semantic: ((5 y + 3 x) mod 17) / 16, 48x64 cells of 8 px, scale 2 and 2.5, share 0.5, threshold 0.48",
-                                "pixels": int(mixed.sum()), "support": support}},
+                                "pixels": int(mixed.sum()), "certainty": certainty}},
             "nms": {"boxes": listed(nb), "scores": listed(ns, 7), "threshold": 0.5, "keep": infer.nms(nb, ns, 0.5, 50).tolist()},
             "decode": {"reference": listed(ref), "deltas": listed(deltas), "height": 384, "width": 512, "boxes": listed(infer.decode(deltas, ref, (384, 512)), 4)}}
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Reference inference with the exported graphs: exactly the steps that the C++ side repeats (see README.md).
 
-usage: infer.py MODEL_DIR IMAGE... --out DIR [--score 0.5] [--threads 2]
+usage: infer.py MODEL_DIR IMAGE... --out DIR [--score 0.45] [--threads 2]
 Writes an overlay (PNG) and prints the instances of every image.
 """
 import argparse
@@ -23,6 +23,7 @@ GREY = 127
 PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.48     # of persons' masks
+SURE = 0.45                                     # least score: even odds, and a mask as sure as good ones are (0.9)
 
 
 def size_of(text):
@@ -118,15 +119,15 @@ def bilinear(table, v, u):
 
 
 def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share=0.0):
-    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image, and the mask's support.
+    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image, and the mask's certainty.
 
-    Bilinear, 0 beyond the 28 x 28 cells. With `semantic` [h, w] at stride 8 the two probabilities are mixed by `share`; support is the
-    mean semantic probability of the mask's pixels (1 without).
+    Bilinear, 0 beyond the 28 x 28 cells. With `semantic` [h, w] at stride 8 the two probabilities are mixed by `share`; certainty is
+    the mean probability of the mask's pixels.
     """
     x0, y0 = max(0, math.floor(box[0])), max(0, math.floor(box[1]))
     x1, y1 = min(size[1], math.ceil(box[2])), min(size[0], math.ceil(box[3]))
     if x1 <= x0 or y1 <= y0:
-        return (0, 0, np.zeros((0, 0), bool)), 1.0
+        return (0, 0, np.zeros((0, 0), bool)), 0.0
     n = prob.shape[0]
     x, y = np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5
     u = ((x - box[0]) / max(box[2] - box[0], 1e-3) * n - 0.5).astype(np.float32)
@@ -134,11 +135,11 @@ def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share
     padded = np.zeros((n + 2, n + 2), np.float32)
     padded[1:-1, 1:-1] = prob
     p = bilinear(padded, v + 1, u + 1)
-    if semantic is None:
-        return (x0, y0, p >= threshold), 1.0
-    s = bilinear(semantic, y * scale[1] / STRIDES[0] - 0.5, x * scale[0] / STRIDES[0] - 0.5)
-    mask = (1 - share) * p + share * s >= threshold
-    return (x0, y0, mask), float(s[mask].mean()) if mask.any() else 0.0
+    if semantic is not None:
+        s = bilinear(semantic, y * scale[1] / STRIDES[0] - 0.5, x * scale[0] / STRIDES[0] - 0.5)
+        p = (1 - share) * p + share * s
+    mask = p >= threshold
+    return (x0, y0, mask), float(p[mask].mean()) if mask.any() else 0.0
 
 
 class OpenVino:
@@ -213,9 +214,7 @@ class Segmenter:
         o = self.g.box(r)
         t0 = self.lap("box", t0)
         boxes = decode(o["deltas"] / BOX_WEIGHTS, prop, self.g.size)
-        floor = np.full(o["probabilities"].shape[1] - 1, least, np.float32)
-        floor[0] = max(0.02, least * least)                # what support 1 would lift to `least`
-        n, c = np.nonzero(o["probabilities"][:, 1:] >= floor)
+        n, c = np.nonzero(o["probabilities"][:, 1:] >= least)
         b, s = boxes[n], o["probabilities"][n, c + 1]
         ok = (b[:, 2] - b[:, 0] >= 2) & (b[:, 3] - b[:, 1] >= 2)
         b, s, c = b[ok], s[ok], c[ok]
@@ -233,12 +232,11 @@ class Segmenter:
         for i in range(len(b)):
             box = b[i] / np.array([fx, fy, fx, fy], np.float32)
             box = np.minimum(box, np.array([bgr.shape[1], bgr.shape[0]] * 2, np.float32))
-            score = float(s[i])
             if c[i] == 0:                                  # persons: the two branches of the network vote together
-                window, support = paste(m[i, 0], box, bgr.shape[:2], self.threshold, semantic, (fx, fy), self.share)
-                score = math.sqrt(score * support)
+                window, certainty = paste(m[i, 0], box, bgr.shape[:2], self.threshold, semantic, (fx, fy), self.share)
             else:
-                window, _ = paste(m[i, 1], box, bgr.shape[:2])
+                window, certainty = paste(m[i, 1], box, bgr.shape[:2])
+            score = float(s[i]) * certainty
             if score >= least and window[2].any():
                 out.append({"class": int(c[i]), "score": score, "box": box, "window": window})
         out.sort(key=lambda i: -i["score"])
@@ -270,7 +268,7 @@ def main():
     a.add_argument("models")
     a.add_argument("images", nargs="+")
     a.add_argument("--out")
-    a.add_argument("--score", type=float, default=0.5)
+    a.add_argument("--score", type=float, default=SURE)
     a.add_argument("--threads", type=int, default=2)
     o = a.parse_args()
     with open(os.path.join(o.models, "model.json")) as f:

@@ -87,23 +87,24 @@ PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& 
                   make_axis(x0, x1, hint->cells_per_px_x, -0.5f, hint->columns),
                   make_axis(y0, y1, hint->cells_per_px_y, -0.5f, hint->rows));
 
-  PastedMask out{cv::Rect(x0, y0, x1 - x0, y1 - y0), cv::Mat(y1 - y0, x1 - x0, CV_8UC1), 1.f};
+  PastedMask out{cv::Rect(x0, y0, x1 - x0, y1 - y0), cv::Mat(y1 - y0, x1 - x0, CV_8UC1)};
   std::vector<float> p(static_cast<std::size_t>(x1 - x0)), q(p.size());
   const float share = hint ? hint->share : 0.f;
-  double support = 0;
+  double sum = 0;
   int inside = 0;
   for (int y = 0; y < out.mask.rows; ++y) {
     own.read_row(y, p);
     if (other) other->read_row(y, q);
     std::uint8_t* to = out.mask.ptr(y);
     for (std::size_t x = 0; x < p.size(); ++x) {
-      const bool in = (1.f - share) * p[x] + share * q[x] >= threshold;
+      const float mixed = (1.f - share) * p[x] + share * q[x];
+      const bool in = mixed >= threshold;
       to[x] = in ? 255 : 0;
       inside += in;
-      support += in ? q[x] : 0.f;
+      sum += in ? mixed : 0.f;
     }
   }
-  if (hint) out.support = inside > 0 ? static_cast<float>(support / inside) : 0.f;
+  if (inside > 0) out.certainty = static_cast<float>(sum / inside);
   return out;
 }
 

@@ -8,9 +8,9 @@ namespace semvslam {
 
 /// A mask in the part of an image that it covers.
 struct PastedMask {
-  cv::Rect window;    // inside the image; empty when the box is
-  cv::Mat mask;       // CV_8UC1, 255 = inside
-  float support = 1;  // mean probability that the hint gives the mask's pixels; 1 without a hint
+  cv::Rect window;      // inside the image; empty when the box is
+  cv::Mat mask;         // CV_8UC1, 255 = inside
+  float certainty = 0;  // mean probability of the mask's pixels; 0 without any
 };
 
 /// A coarse map of the probability that a pixel belongs to the object's kind, and how much it counts.

@@ -9,7 +9,6 @@
 namespace semvslam {
 namespace {
 
-constexpr float kLeastPersonScore = 0.02f;
 constexpr float kLeastProposalSide = 4, kLeastObjectSide = 2;  // px of the network's input
 
 bool finite(std::span<const float> values) {
@@ -100,8 +99,6 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
              used_d = head->deltas.first(proposals.size() * 4);
   if (!finite(used_p) || !finite(used_d)) return not_finite("classes or boxes");
 
-  // A person's final score is the root of this one times the support of its mask: what full support would lift passes.
-  const float person_floor = std::max(kLeastPersonScore, limits_.score * limits_.score);
   std::vector<std::vector<Object>> by_class(classes);
   for (std::size_t n = 0; n < proposals.size(); ++n) {
     const DetectionBox box =
@@ -109,7 +106,7 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
                    static_cast<float>(model_.input.height));
     if (box.width() < kLeastObjectSide || box.height() < kLeastObjectSide) continue;
     for (std::size_t c = 0; c < classes; ++c)
-      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= (c == 0 ? person_floor : limits_.score))
+      if (const float p = used_p[n * (classes + 1) + c + 1]; p >= limits_.score)
         by_class[c].push_back({box, static_cast<int>(c), p});
   }
   for (const std::vector<Object>& candidates : by_class) {
@@ -148,10 +145,12 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
     if (!finite(mask)) return not_finite("masks");
     const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
                            std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
-    PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
-                                   person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
-    const float score = person ? std::sqrt(o.score * pasted.support) : o.score;
-    if (!(score >= limits_.score) || pasted.window.empty() || cv::countNonZero(pasted.mask) == 0) continue;
+    const PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
+                                         person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
+    // With how sure its mask is (the "maskness" of X. Wang et al., SOLOv2, 2020) the score tells good objects from
+    // doubtful ones better than by the box head alone.
+    const float score = o.score * pasted.certainty;
+    if (!(score >= limits_.score) || pasted.certainty == 0) continue;
     Instance i;
     i.class_index = o.class_index;
     i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];

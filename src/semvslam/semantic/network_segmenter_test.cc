@@ -94,7 +94,8 @@ TEST(NetworkSegmenter, AnAnchorThatIsSureBecomesAnInstanceInImagePixels) {
   const Instance& i = s->instances[0];
   EXPECT_EQ(i.class_name, "person");
   EXPECT_EQ(i.role, Role::kDynamic);
-  EXPECT_FLOAT_EQ(i.score, std::sqrt(0.8f));  // the semantic map supports all of it
+  EXPECT_LT(i.score, 0.8f);  // mask and semantic map are sure of all of it, but for the mask's fading edge
+  EXPECT_GT(i.score, 0.96f * 0.8f);
   EXPECT_EQ(i.box, cv::Rect2f(32, 32, 128, 128));
   EXPECT_EQ(i.window, cv::Rect(32, 32, 128, 128));
 }

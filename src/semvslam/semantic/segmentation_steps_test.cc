@@ -71,7 +71,7 @@ TEST(SegmentationSteps, PastingGivesTheReferencesPixels) {
   const PastedMask both = paste_mask(probabilities.data(), 28, box_of(wanted.at("box")),
                                      {wanted.at("width"), wanted.at("height")}, 0.48f, &hint);
   EXPECT_NEAR(cv::countNonZero(both.mask), mixed.at("pixels").get<int>(), 3);
-  EXPECT_NEAR(both.support, mixed.at("support").get<float>(), 2e-3);
+  EXPECT_NEAR(both.certainty, mixed.at("certainty").get<float>(), 2e-3);
 }
 
 TEST(SegmentationSteps, SuppressionAndDecodingAgreeWithTheReference) {
