@@ -16,7 +16,9 @@ void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
   parser.add_option("--precision", options.precision, "auto, f32 or int8")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "f32", "int8"}));
-  parser.add_option("--input-width", options.input_width_px, "of the image that the network sees, px; 0: the model's")
+  parser
+      .add_option("--input-width", options.input_width_px,
+                  "of the image that the network sees, px; 0: 1.2 times the model's, in eight bits the model's")
       ->capture_default_str()
       ->check(CLI::Range(0, 4096));
 }
