@@ -24,12 +24,12 @@ def sequence_rows(scores, wanted):
     """Table rows of the sequences among the scores."""
     return "".join(f"| {name} | {v['frames']} | {num(v['recall_median'])} | {num(v['precision_median'])} | {wanted.get(name, '')} | "
                    f"{v['clear_frames_with_false_person']} of {v['clear_frames']} |\n"
-                   for name, v in scores.items() if isinstance(v, dict) and "recall_median" in v and "_at_" not in name)
+                   for name, v in scores.items() if isinstance(v, dict) and "recall_median" in v)
 
 
-def eight_bits(width_px, c):
-    """Table row of the INT8 trunk at a width."""
-    return (f"| {width_px} px wide | {c['person_segm_ap50']:.3f} | {c['person_pixel_iou']:.3f} | {c['near_person_recall']:.3f}, "
+def other_input(kind, c):
+    """Table row of another kind of trunk or width."""
+    return (f"| {kind} | {c['person_segm_ap50']:.3f} | {c['person_pixel_iou']:.3f} | {c['near_person_recall']:.3f}, "
             f"{c['near_person_mean_iou']:.3f} |")
 
 
@@ -84,7 +84,7 @@ convolutions of the pyramid were fitted to it, so that pyramid and heads went on
 leading five blocks of the backbone (up to the first at stride 8) keep their start weights, before the fourth run the leading seven.
 
 ## Scores (training/evaluate.py, OpenVINO in float32; person pixels at score >= {c['score_threshold']})
-Held-out pictures drawn by people (`val.json`, {c['images']} images):
+Held-out pictures drawn by people (`val.json`, {c['images']} images), seen 768 px wide, as `segment` and `eval-seg` do:
 
 | | measured | wanted |
 |---|---|---|
@@ -97,14 +97,16 @@ Held-out pictures drawn by people (`val.json`, {c['images']} images):
 | person box AP50 | {c['person_bbox_ap50']:.3f} | |
 | all classes, mask AP50 / AP | {c['all_segm_ap50']:.3f} / {c['all_segm_ap']:.3f} | |
 
-In eight bits, as processors without 16-bit floats run it (near persons: found, mean IoU):
+Other widths, and eight bits as processors without 16-bit floats run it: `run` takes {size['width']} px in floats and 416 px in eight bits,
+`segment` {size['width']} px in eight bits (near persons: found, mean IoU):
 
-| input | AP50 | pixel IoU | near persons |
+| trunk | AP50 | pixel IoU | near persons |
 |---|---|---|---|
-{eight_bits(size['width'], s['coco_int8'])}
-{eight_bits(448, s['coco_int8_448'])}
+{other_input(f"float, {size['width']} px", s['coco_640'])}
+{other_input(f"eight bits, {size['width']} px", s['coco_int8'])}
+{other_input("eight bits, 416 px", s['coco_int8_416'])}
 
-Composed RGB-D sequences (real room, cut-out actors), person pixels, medians over frames:
+Composed RGB-D sequences (real room, cut-out actors), {size['width']} px in float32, person pixels, medians over frames:
 
 | sequence | frames | recall | precision | wanted | empty frames with a false person |
 |---|---|---|---|---|---|
@@ -117,19 +119,17 @@ Rendered sequences (other seeds than those trained on: other people, dress, text
 |---|---|---|---|---|---|
 """ + sequence_rows(s["rendered"], dict.fromkeys(s["rendered"], "0.90 / 0.90"))
     out += f"""
-Person pixels on the held-out pictures at score >= {s['coco_at_0.6']['score_threshold']}: IoU {s['coco_at_0.6']['person_pixel_iou']:.3f}, recall {s['coco_at_0.6']['person_pixel_recall']:.3f}, precision {s['coco_at_0.6']['person_pixel_precision']:.3f}.
-How the two branches' masks are mixed was chosen on these held-out pictures and some frames of the sequences, and the size of
-the input by both (`training/README.md`): these numbers are therefore a little optimistic. The held-out pictures are COCO's, and
-some may have been among those that the start weights' detector was trained on: there the scores may flatter. The sequences cannot
-have been.
+How the two branches' masks are mixed, and how a score is made of box and mask, was chosen on these held-out pictures and some frames of
+the sequences, and the size of the input by both (`training/README.md`): these numbers are therefore a little optimistic. The held-out
+pictures are COCO's, and some may have been among those that the start weights' detector was trained on: there the scores may flatter.
+The sequences cannot have been.
 
 ## Limits
 Not all targets on the held-out pictures are reached (crowds, small and unusual persons; false persons on pictures without any; with so few
 pictures one of them moves the pixel IoU by some 0.05), nor those on most rendered sequences (of seated persons the legs between those of
 desk and chairs are missing); those on the composed sequences are.
 Trained for persons; the other 21 classes have few drawn masks and are weak. Small persons (under about 40 px) are often missed. Two
-detections of one person, or a chair or clothes on a hook taken for a person, occur: `dynamic` checks with motion and depth. The program's
-default score is 0.6: recall on kitchen_walk is then {s['kitchen_walk_at_0.6']['recall_median']:.3f}, and {s['kitchen_static_at_0.6']['clear_frames_with_false_person']} frames of kitchen_static show a false person (at 0.5: {s['kitchen_static']['clear_frames_with_false_person']}).
+detections of one person, or a chair or clothes on a hook taken for a person, occur: `dynamic` checks with motion and depth.
 
 ## SHA-256
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Scores exported graphs (or a check point): COCO mask AP, person pixels, near persons; composed sequences.
 
-usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--sequence DIR ...] [--score 0.45] [--json OUT]
+usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--drawn N] [--sequence DIR ...] [--score 0.45] [--json OUT]
 """
 import argparse
 import contextlib
@@ -59,16 +59,24 @@ def iou(a, b):
     return (a & b).sum() / max(1, (a | b).sum())
 
 
-def score_coco(seg, names, json_path, images, threshold):
+def drawn_by_people(coco, person):
+    """Ids of the pictures with a person whose mask people drew."""
+    return [i for i in sorted(coco.getImgIds()) if any(a["category_id"] == person and not a.get("iscrowd") and a.get("source") in ("coco", "ground-truth")
+                                                       for a in coco.loadAnns(coco.getAnnIds(i)))]
+
+
+def score_coco(seg, names, json_path, images, threshold, drawn=0):
+    """drawn: of so many pictures alone, the first in which people drew a person; 0 = all."""
     from pycocotools import mask as rle
     from pycocotools.coco import COCO
     from pycocotools.cocoeval import COCOeval
     with contextlib.redirect_stdout(io.StringIO()):
         coco = COCO(json_path)
     ids = {c["name"]: c["id"] for c in coco.loadCats(coco.getCatIds())}
+    chosen = drawn_by_people(coco, ids["person"])[:drawn] if drawn else coco.getImgIds()
     results, inter, union, tp_px, truth_px = [], 0, 0, 0, 0
     found_iou, near = [], 0
-    for image_id in coco.getImgIds():
+    for image_id in chosen:
         info = coco.loadImgs(image_id)[0]
         bgr = cv2.imread(os.path.join(images, info["file_name"]))
         size = bgr.shape[:2]
@@ -105,7 +113,7 @@ def score_coco(seg, names, json_path, images, threshold):
             if best is not None and iou(persons[best], t) >= 0.5:
                 found_iou.append(iou(persons[best], t))
                 free.remove(best)
-    out = {"images": len(coco.getImgIds()), "score_threshold": threshold, "person_pixel_iou": inter / max(1, union),
+    out = {"images": len(chosen), "score_threshold": threshold, "person_pixel_iou": inter / max(1, union),
            "person_pixel_recall": inter / max(1, truth_px), "person_pixel_precision": inter / max(1, tp_px),
            "near_persons": near, "near_person_recall": len(found_iou) / max(1, near), "near_person_mean_iou": float(np.mean(found_iou)) if found_iou else 0.0}
     with contextlib.redirect_stdout(io.StringIO()):
@@ -113,7 +121,7 @@ def score_coco(seg, names, json_path, images, threshold):
         for kind in ("segm", "bbox"):
             for which, cats in (("person", [ids["person"]]), ("all", [ids[n] for n in names])):
                 e = COCOeval(coco, shown, kind)
-                e.params.catIds = cats
+                e.params.catIds, e.params.imgIds = cats, chosen
                 e.evaluate()
                 e.accumulate()
                 e.summarize()
@@ -154,6 +162,7 @@ def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("model")
     a.add_argument("--coco", nargs=2, metavar=("JSON", "IMAGES"))
+    a.add_argument("--drawn", type=int, default=0, metavar="N", help="only the first N pictures in which people drew a person")
     a.add_argument("--sequence", nargs="*", default=[])
     a.add_argument("--step", type=int, default=5, help="every so many frames of a sequence")
     a.add_argument("--score", type=float, default=infer.SURE)
@@ -164,7 +173,7 @@ def main():
     seg, names = open_model(o.model, o.size, o.int8)
     out = {"model": os.path.basename(os.path.normpath(o.model))}
     if o.coco:
-        out["coco"] = score_coco(seg, names, *o.coco, o.score)
+        out["coco"] = score_coco(seg, names, *o.coco, o.score, o.drawn)
     for s in o.sequence:
         out[os.path.basename(os.path.normpath(s))] = score_sequence(seg, s, o.score, o.step)
     print(json.dumps(out, indent=1))
