@@ -273,6 +273,21 @@ TEST_F(ShippedNetwork, PersonsAreFoundAtOtherWidthsAndInEightBits) {
   EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
 }
 
+TEST_F(ShippedNetwork, WhereNoCameraWaitsAPictureIsSeenWiderButNotInEightBits) {
+  SegmenterOptions options;
+  options.model = kModels.string();
+  options.backend = "openvino";
+  const auto input_of = [&](const char* precision, bool keep_up) {
+    options.precision = precision;
+    options.keep_up = keep_up;
+    const auto segmenter = make_segmenter(options, RoleTable());
+    return segmenter ? (*segmenter)->description() : segmenter.error().message;
+  };
+  EXPECT_THAT(input_of("f32", true), HasSubstr("640x480"));
+  EXPECT_THAT(input_of("f32", false), HasSubstr("768x576"));
+  EXPECT_THAT(input_of("int8", false), HasSubstr("640x480"));
+}
+
 TEST_F(ShippedNetwork, EightBitsThatTheModelLacksAreAnError) {
   Result<ModelDescription> model = ModelDescription::read(kModels);
   ASSERT_TRUE(model);
