@@ -27,7 +27,6 @@ struct ModelDescription {
   int channels = 0;
   float semantic_share = 0;     // weight of the semantic map in a person's mask
   float mask_threshold = 0.5f;  // of a person's mixed mask
-  int proposals = 100;          // regions of an image that the box head judges; not from model.json
 
   /// 10^9 operations (two to a multiply-add) that each graph takes, counted when it was exported; 0 = not known.
   struct Cost {

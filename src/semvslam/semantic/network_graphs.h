@@ -35,13 +35,15 @@ struct BoxHeadOutput {
 /// The three parts of a network as some inference library runs them. Not safe for concurrent use.
 class NetworkGraphs {
  public:
-  static constexpr int kBoxCells = 7;  // along an edge of a region
+  // Regions of one call of the box head (below 96 OpenVINO takes a kernel that makes 64 slower than 100); cells along
+  // an edge.
+  static constexpr int kBoxBatch = 100, kBoxCells = 7;
   static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
 
   virtual ~NetworkGraphs() = default;
   /// @param image CV_8UC3 BGR of the model's input size.
   virtual Result<TrunkOutput> trunk(const cv::Mat& image) = 0;
-  /// Where the features of model.proposals regions are to be written before box_head().
+  /// Where the features of kBoxBatch regions are to be written before box_head().
   virtual std::span<float> box_input() = 0;
   virtual Result<BoxHeadOutput> box_head() = 0;
   /// The same for one region: an image has few. @return kMaskChannels x kMaskSide x kMaskSide probabilities.

@@ -72,7 +72,7 @@ Result<std::vector<DetectionBox>> NetworkSegmenter::propose(const TrunkOutput& t
     }
   }
   std::vector<DetectionBox> out;
-  for (const int i : suppress_overlaps(boxes, scores, limits_.proposal_overlap, model_.proposals))
+  for (const int i : suppress_overlaps(boxes, scores, limits_.proposal_overlap, NetworkGraphs::kBoxBatch))
     out.push_back(boxes[i]);
   return out;
 }
@@ -88,7 +88,7 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
   std::vector<Object> found;
   if (proposals.empty()) return found;
   const std::span<float> input = graphs_->box_input();
-  const std::size_t region = input.size() / static_cast<std::size_t>(model_.proposals);
+  const std::size_t region = input.size() / NetworkGraphs::kBoxBatch;
   for (std::size_t n = 0; n < proposals.size(); ++n)
     align_region(trunk, proposals[n], model_.box_levels, NetworkGraphs::kBoxCells, &input[n * region]);
   std::fill(input.begin() + static_cast<std::ptrdiff_t>(proposals.size() * region), input.end(), 0.f);

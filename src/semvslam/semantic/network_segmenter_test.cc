@@ -33,10 +33,10 @@ class FakeGraphs final : public NetworkGraphs {
     }
     semantic_.assign(static_cast<std::size_t>(model.input.area()) / 64 * TrunkOutput::kSemanticChannels, 1.f);
     out_.semantic = semantic_;
-    box_in_.resize(static_cast<std::size_t>(model.proposals) * kBoxCells * kBoxCells * model.channels);
+    box_in_.resize(static_cast<std::size_t>(kBoxBatch) * kBoxCells * kBoxCells * model.channels);
     mask_in_.resize(static_cast<std::size_t>(kMaskCells) * kMaskCells * model.channels);
-    probabilities_.assign(model.proposals * (classes_ + 1), 0.f);
-    deltas_.assign(static_cast<std::size_t>(model.proposals) * 4, 0.f);
+    probabilities_.assign(kBoxBatch * (classes_ + 1), 0.f);
+    deltas_.assign(kBoxBatch * 4, 0.f);
     masks_.assign(static_cast<std::size_t>(kMaskChannels) * kMaskSide * kMaskSide, 1.f);
   }
   Result<TrunkOutput> trunk(const cv::Mat&) override { return out_; }
@@ -143,7 +143,7 @@ TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
 TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {
   const auto model = ModelDescription::read(kModels);
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_NEAR(model->gflops.of_image(model->proposals, 5), 6.55, 0.01);  // training/table2.py
+  EXPECT_NEAR(model->gflops.of_image(NetworkGraphs::kBoxBatch, 5), 6.55, 0.01);  // training/table2.py
 }
 
 TEST(ModelDescription, AnotherWidthKeepsTheShapeOfTheInput) {

@@ -15,7 +15,7 @@ class OpenCvGraphs final : public NetworkGraphs {
         trunk_(read(folder / model.trunk)),
         box_(read(folder / model.box)),
         mask_(read(folder / model.mask)) {
-    const int box_shape[] = {model.proposals, kBoxCells, kBoxCells, model.channels};
+    const int box_shape[] = {kBoxBatch, kBoxCells, kBoxCells, model.channels};
     const int mask_shape[] = {1, kMaskCells, kMaskCells, model.channels};
     box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
     mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
@@ -61,8 +61,8 @@ class OpenCvGraphs final : public NetworkGraphs {
       const std::vector<cv::String> names{"probabilities", "deltas"};
       box_out_.clear();
       box_.forward(box_out_, names);
-      return BoxHeadOutput{numbers(box_out_[0], model_.proposals * (model_.classes.size() + 1), names[0]),
-                           numbers(box_out_[1], static_cast<std::size_t>(model_.proposals) * 4, names[1])};
+      return BoxHeadOutput{numbers(box_out_[0], kBoxBatch * (model_.classes.size() + 1), names[0]),
+                           numbers(box_out_[1], kBoxBatch * 4, names[1])};
     });
   }
 

@@ -45,10 +45,10 @@ class OpenVinoGraphs final : public NetworkGraphs {
     load_trunk(folder / trunk_name_, options);
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
-    const auto c = static_cast<std::size_t>(model.channels), regions = static_cast<std::size_t>(model.proposals);
-    box_ = load_head(folder / model.box, {regions, kBoxCells, kBoxCells, c}, options);
-    probabilities_ = output(box_, model.box, "probabilities", {regions, model.classes.size() + 1});
-    box_deltas_ = output(box_, model.box, "deltas", {regions, 4});
+    const auto c = static_cast<std::size_t>(model.channels);
+    box_ = load_head(folder / model.box, {kBoxBatch, kBoxCells, kBoxCells, c}, options);
+    probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
+    box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
     mask_ = load_head(folder / model.mask, {1, kMaskCells, kMaskCells, c}, options);
     masks_ = output(mask_, model.mask, "masks", {1, kMaskChannels, kMaskSide, kMaskSide});
   }

@@ -24,7 +24,6 @@ class NoSegmenter final : public Segmenter {
 
 // How wide the network sees an image, where the options do not say, in widths of the model's input.
 constexpr double kSlowMachineWidth = 0.65;  // less than half the time; persons near by lose little by it
-constexpr int kSlowMachineProposals = 64;   // at that width as good as 100
 // Where no camera waits: finds more small persons for half as much time again (in eight bits it does not).
 constexpr double kStillsWidth = 1.2;
 
@@ -42,10 +41,7 @@ Settled settle(const SegmenterOptions& options, bool openvino, ModelDescription&
   int width_px = options.input_width_px;
   if (slow && options.precision == "auto") {
     out.precision = model.trunk_int8.empty() ? "f32" : "int8";
-    if (width_px == 0 && options.keep_up) {
-      width_px = static_cast<int>(kSlowMachineWidth * model.input.width);
-      model.proposals = kSlowMachineProposals;
-    }
+    if (width_px == 0 && options.keep_up) width_px = static_cast<int>(kSlowMachineWidth * model.input.width);
   }
   if (width_px == 0 && openvino && !options.keep_up && out.precision != "int8")
     width_px = static_cast<int>(kStillsWidth * model.input.width);
