@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/base/side_task.h"
 #include "semvslam/dynamic/instance_rest.h"
 #include "semvslam/dynamic/mover_reach.h"
 #include "semvslam/geometry/depth_image.h"
@@ -41,6 +42,7 @@ struct DynamicFilter::State {
     if (o.motion) motion.emplace(c, o.motion_options);
   }
 
+  MotionFrame motion_frame() const;
   void use_segmentation(const Segmentation* given);
   void compose_mask();
   void expect_movers();
@@ -87,6 +89,7 @@ struct DynamicFilter::State {
                         [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
   }
   std::vector<MotionVerdict> verdicts;  // scratch
+  SideTask following;                   // of the point tracks into the present frame; last, so that it ends first
 };
 
 DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options)
@@ -100,12 +103,24 @@ void DynamicFilter::begin(const RgbdFrame& frame, const Segmentation* segmentati
   s.cur_from_prev = cur_from_prev;
   s.record = std::make_shared<DynamicRecord>();
   s.record->frame = frame.id;
+  // Beside what else comes before judge(), the extraction of features above all: it needs none of that.
+  if (s.motion) s.following.start([&s, images = s.motion_frame()] { s.motion->follow(images); });
   s.segmentation = {};
   if (s.repair) s.use_segmentation(segmentation);
   s.masked_instances = s.segmentation.instances.size();
   s.movers_avoided = true;
   s.expect_movers();
   s.compose_mask();
+}
+
+MotionFrame DynamicFilter::State::motion_frame() const {
+  MotionFrame out;
+  out.id = frame.id;
+  out.time_s = frame.stamp.seconds();
+  out.gray = frame.gray;
+  out.depth = frame.depth;
+  out.cur_from_prev = cur_from_prev;
+  return out;
 }
 
 void DynamicFilter::State::use_segmentation(const Segmentation* given) {
@@ -233,15 +248,11 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.moving = s.excluded;
   if (!s.motion) return s.usable;
 
-  MotionFrame frame;
-  frame.id = s.frame.id;
-  frame.time_s = s.frame.stamp.seconds();
-  frame.gray = s.frame.gray;
-  frame.depth = s.frame.depth;
-  frame.cur_from_prev = s.cur_from_prev;
+  MotionFrame frame = s.motion_frame();
   frame.corners = pixels;
   frame.excluded = s.excluded;
   frame.watched = s.watched_parts(frame.time_s);
+  s.following.wait();
   s.motion_result = s.motion->step(frame);
   s.last_time_s = frame.time_s;
   s.motion->judge(pixels, depths_m, s.verdicts);
@@ -386,6 +397,7 @@ void DynamicFilter::use_motion() {
 }
 
 void DynamicFilter::forget_poses() {
+  state_->following.wait();
   if (state_->motion) state_->motion->forget_poses();
 }
 

@@ -152,14 +152,26 @@ void FlowTracks::reset() {
   tracks_.clear();
   lost_.clear();
   pyramid_ = previous_pyramid_ = {};
+  followed_ = false;
 }
 
-void FlowTracks::step(const MotionFrame& frame) {
+void FlowTracks::follow(const MotionFrame& frame) {
   check_frame(frame, camera_);
   lost_.clear();
   std::swap(pyramid_, previous_pyramid_);
   pyramid_.build(frame.gray, options_.levels, options_.window_px);
-  if (!tracks_.empty() && !previous_pyramid_.empty()) follow(frame);
+  if (!tracks_.empty() && !previous_pyramid_.empty()) follow_all(frame);
+  followed_ = true;
+}
+
+void FlowTracks::step(const MotionFrame& frame) {
+  check_frame(frame, camera_);
+  if (!followed_) follow(frame);
+  followed_ = false;
+  for (FlowTrack& track : tracks_) {
+    const Eigen::Vector2f& pixel = track.newest().pixel;
+    track.set_newest_excluded(is_masked(frame.excluded, {pixel.x(), pixel.y()}));
+  }
   refill(frame);
 }
 
@@ -199,7 +211,7 @@ std::variant<cv::Point2f, TrackLoss> FlowTracks::find(cv::Point2f from, cv::Poin
   return to;
 }
 
-void FlowTracks::follow(const MotionFrame& frame) {
+void FlowTracks::follow_all(const MotionFrame& frame) {
   Occupancy occupied(camera_.width_px, camera_.height_px, std::max(2, options_.min_distance_px / 2));
   std::size_t kept = 0;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
@@ -225,7 +237,6 @@ TrackSample FlowTracks::make_sample(const MotionFrame& frame, const Eigen::Vecto
   sample.time_s = frame.time_s;
   sample.pixel = pixel;
   sample.ideal = camera_.undistort(pixel.cast<double>()).cast<float>();
-  sample.excluded = is_masked(frame.excluded, {pixel.x(), pixel.y()});
   const int x = static_cast<int>(std::lround(pixel.x())), y = static_cast<int>(std::lround(pixel.y()));
   const cv::Vec3f texture = mean_texture(pyramid_, {x, y}, kTextureRadiusPx);
   sample.texture = {texture[0], texture[1], texture[2]};
@@ -263,6 +274,7 @@ void FlowTracks::refill(const MotionFrame& frame) {
     ++count[cell_of(p)];
     tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
+    tracks_.back().set_newest_excluded(is_masked(frame.excluded, p));
   };
   // The caller's corners may leave out what is watched: it comes first, the rest is always enough.
   const bool search_all = frame.corners.empty();

@@ -43,6 +43,7 @@ class FlowTrack {
     return samples_[static_cast<std::size_t>((head_ - age + kCapacity) % kCapacity)];
   }
   const TrackSample& newest() const { return sample(0); }
+  void set_newest_excluded(bool excluded) { samples_[static_cast<std::size_t>(head_)].excluded = excluded; }
   /// Frames since the track began, also those no longer held.
   int length() const { return length_; }
   void push(const TrackSample& sample);
@@ -92,6 +93,9 @@ class FlowTracks {
   /// Follows all tracks into this frame and starts new ones. The frame's cur_from_prev, together with the depth of a
   /// track, gives where the search starts. A frame of another size than the camera's is a programming error (throws).
   void step(const MotionFrame& frame);
+  /// The first half of step(), which needs no masks and no corners. Given beforehand, step() of the same frame does the
+  /// second half only.
+  void follow(const MotionFrame& frame);
 
   const std::vector<FlowTrack>& tracks() const { return tracks_; }
   /// Of the last step.
@@ -105,7 +109,7 @@ class FlowTracks {
   cv::Point2f predict(const MotionFrame& frame, const TrackSample& last) const;
   /// Where a point went, or why it is lost. @param start where it is searched for
   std::variant<cv::Point2f, TrackLoss> find(cv::Point2f from, cv::Point2f start) const;
-  void follow(const MotionFrame& frame);
+  void follow_all(const MotionFrame& frame);
   void refill(const MotionFrame& frame);
   TrackSample make_sample(const MotionFrame& frame, const Eigen::Vector2f& pixel) const;
 
@@ -116,6 +120,7 @@ class FlowTracks {
   std::vector<LostTrack> lost_;
   LucasKanadeOptions forward_, backward_;
   FlowPyramid pyramid_, previous_pyramid_;
+  bool followed_ = false;  // into the frame that step() will be given
 };
 
 }  // namespace semvslam

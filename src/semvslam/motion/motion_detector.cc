@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 namespace semvslam {
 namespace {
@@ -33,13 +34,19 @@ MotionDetector::MotionDetector(const Camera& camera, const MotionOptions& option
       check_(camera, options.check, options.camera, options.fundamental),
       regions_(camera, options.regions, options.check) {}
 
+void MotionDetector::follow(const MotionFrame& frame) {
+  auto clock = std::chrono::steady_clock::now();
+  tracks_.follow(frame);
+  followed_ms_ = ms_since(clock);
+}
+
 MotionResult MotionDetector::step(const MotionFrame& frame) {
   MotionResult result;
   result.frame = frame.id;
   auto clock = std::chrono::steady_clock::now();
   tracks_.step(frame);
   for (const LostTrack& lost : tracks_.lost()) ++result.lost[static_cast<std::size_t>(lost.reason)];
-  result.flow_ms = ms_since(clock);
+  result.flow_ms = ms_since(clock) + std::exchange(followed_ms_, 0);
   result.check = check_.step(frame, tracks_.tracks(), regions_.mask());
   result.check_ms = ms_since(clock);
   regions_.step(frame, tracks_.tracks(), result.check);

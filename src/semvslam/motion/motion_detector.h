@@ -37,6 +37,9 @@ class MotionDetector {
   MotionDetector(const Camera& camera, const MotionOptions& options);
 
   MotionResult step(const MotionFrame& frame);
+  /// The part of step() that needs the frame's images and cur_from_prev alone, half of its time: may be done
+  /// beforehand, by another thread as long as nothing else is called.
+  void follow(const MotionFrame& frame);
   const std::vector<FlowTrack>& tracks() const { return tracks_.tracks(); }
 
   /// Poses that tracking found after step(): see MotionCheck. They need not be given.
@@ -55,6 +58,7 @@ class MotionDetector {
   MotionCheck check_;
   MovingRegions regions_;
   MotionResult last_;
+  double followed_ms_ = 0;
 };
 
 }  // namespace semvslam
