@@ -122,6 +122,30 @@ TEST(FlowTracks, StartsAtGivenCornersOutsideTheExcludedMask) {
   }
 }
 
+TEST(FlowTracks, FollowingBeforehandWithoutMasksChangesNothing) {
+  const cv::Mat large = texture();
+  FlowTracks at_once(test_camera(), {}), in_parts(test_camera(), {});
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const MotionFrame images = frame_of(i, shifted(large, 5.0 * i, 2.0 * i));
+    MotionFrame whole = images;
+    whole.excluded = cv::Mat::zeros(480, 640, CV_8UC1);
+    whole.excluded.colRange(0, 100 + 100 * static_cast<int>(i)).setTo(255);
+    at_once.step(whole);
+    in_parts.follow(images);
+    in_parts.step(whole);
+    ASSERT_EQ(at_once.tracks().size(), in_parts.tracks().size());
+    EXPECT_EQ(at_once.lost().size(), in_parts.lost().size());
+    for (std::size_t k = 0; k < at_once.tracks().size(); ++k) {
+      const FlowTrack &a = at_once.tracks()[k], &b = in_parts.tracks()[k];
+      EXPECT_EQ(a.id(), b.id());
+      EXPECT_EQ(a.length(), b.length());
+      EXPECT_EQ(a.newest().pixel, b.newest().pixel);
+      EXPECT_EQ(a.newest().excluded, b.newest().excluded);
+      EXPECT_EQ(a.newest().excluded, a.newest().pixel.x() < static_cast<float>(100 + 100 * i) - 0.5f);
+    }
+  }
+}
+
 TEST(FlowTracks, HistoryIsARing) {
   FlowTrack track(PointTrackId(7));
   for (int k = 0; k < 30; ++k) {
