@@ -168,11 +168,11 @@ void FlowTracks::step(const MotionFrame& frame) {
   check_frame(frame, camera_);
   if (!followed_) follow(frame);
   followed_ = false;
+  refill(frame);
   for (FlowTrack& track : tracks_) {
     const Eigen::Vector2f& pixel = track.newest().pixel;
     track.set_newest_excluded(is_masked(frame.excluded, {pixel.x(), pixel.y()}));
   }
-  refill(frame);
 }
 
 bool FlowTracks::is_inside(cv::Point2f p) const {
@@ -274,7 +274,6 @@ void FlowTracks::refill(const MotionFrame& frame) {
     ++count[cell_of(p)];
     tracks_.emplace_back(PointTrackId(next_id_++));
     tracks_.back().push(make_sample(frame, {p.x, p.y}));
-    tracks_.back().set_newest_excluded(is_masked(frame.excluded, p));
   };
   // The caller's corners may leave out what is watched: it comes first, the rest is always enough.
   const bool search_all = frame.corners.empty();
