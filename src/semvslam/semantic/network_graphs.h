@@ -54,8 +54,9 @@ class NetworkGraphs {
 
 /// Errors: a graph that cannot be read, or whose inputs and outputs differ from the description (the message names the
 /// tensor), or a build without OpenVINO (kUnsupported).
-/// @param precision "auto" (the float graphs in the fastest type of the machine), "f32", or "int8": the trunk in eight
-/// bits, which a model may lack (kInvalidInput). The trunk takes images of model.input, whatever it was exported for.
+/// @param precision "auto" (the float graphs in the fastest float type of the machine), "f32", or "int8": the trunk in
+/// eight bits, which a model may lack (kInvalidInput). The trunk takes images of model.input, whatever it was exported
+/// for.
 Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
                                                             const ModelDescription& model, const std::string& precision,
                                                             int threads);
@@ -63,8 +64,15 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder,
                                                           const ModelDescription& model);
 bool have_openvino();
-/// Whether this processor computes in sixteen-bit floats, which double the speed of float graphs; false without
-/// OpenVINO.
-bool has_short_floats();
+
+/// In which numbers a processor computes convolutions fast.
+enum class FastNumbers {
+  kShortFloats,  // sixteen-bit floats: twice as fast as 32 bits, or more
+  kEightBits,    // products of eight bits in one instruction (VNNI): three times as fast as floats
+  kNone,         // eight bits help, by instructions that were not made for it
+};
+/// Of this processor; kNone without OpenVINO. Intel's AVX-512 multiplies bfloat16 no faster than 32-bit floats, so that
+/// there sixteen bits count only with AMX, which virtual machines often lack.
+FastNumbers fast_numbers();
 
 }  // namespace semvslam

@@ -288,6 +288,26 @@ TEST_F(ShippedNetwork, WhereNoCameraWaitsAPictureIsSeenWiderButNotInEightBits) {
   EXPECT_THAT(input_of("int8", false), HasSubstr("640x480"));
 }
 
+TEST_F(ShippedNetwork, BesideACameraTheProcessorDecidesWhichTrunkAndHowWide) {
+  SegmenterOptions options;
+  options.model = kModels.string();
+  options.backend = "openvino";
+  const auto segmenter = make_segmenter(options, RoleTable());
+  ASSERT_TRUE(segmenter) << segmenter.error().message;
+  const std::string chosen = (*segmenter)->description();
+  switch (fast_numbers()) {
+    case FastNumbers::kShortFloats:
+      EXPECT_THAT(chosen, HasSubstr("trunk.onnx, 640x480"));
+      break;
+    case FastNumbers::kEightBits:
+      EXPECT_THAT(chosen, HasSubstr("trunk.int8.xml, 512x384"));
+      break;
+    case FastNumbers::kNone:
+      EXPECT_THAT(chosen, HasSubstr("trunk.int8.xml, 416x320"));
+      break;
+  }
+}
+
 TEST_F(ShippedNetwork, EightBitsThatTheModelLacksAreAnError) {
   Result<ModelDescription> model = ModelDescription::read(kModels);
   ASSERT_TRUE(model);

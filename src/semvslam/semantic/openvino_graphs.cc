@@ -8,6 +8,10 @@
 #include <algorithm>
 #include <openvino/openvino.hpp>
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 namespace semvslam {
 namespace {
 
@@ -23,6 +27,26 @@ ov::Core& core() {
   return shared;
 }
 
+/// What decides whether a processor's sixteen-bit floats and eight-bit products are fast.
+struct Instructions {
+  bool intel = false, amx = false, vnni = false;
+};
+
+Instructions instructions() {
+  Instructions out;
+#if defined(__x86_64__)
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  if (__get_cpuid(0, &a, &b, &c, &d)) out.intel = b == signature_INTEL_ebx;
+  if (__get_cpuid_count(7, 0, &a, &b, &c, &d)) {
+    constexpr unsigned kAvx512Vnni = 1U << 11U, kAmxBf16 = 1U << 22U, kAvxVnni = 1U << 4U;
+    out.vnni = (c & kAvx512Vnni) != 0;
+    out.amx = (d & kAmxBf16) != 0;
+    if (a >= 1 && __get_cpuid_count(7, 1, &a, &b, &c, &d)) out.vnni |= (a & kAvxVnni) != 0;
+  }
+#endif
+  return out;
+}
+
 std::size_t count(const Shape& shape) {
   std::size_t n = 1;
   for (const std::size_t s : shape) n *= s;
@@ -35,7 +59,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
                  int threads)
       : model_(model) {
     ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(threads), ov::hint::enable_cpu_pinning(false)};
-    if (precision == "f32") options.insert(ov::hint::inference_precision(ov::element::f32));
+    // OpenVINO would take bfloat16 wherever it exists, also where it is slower.
+    if (precision == "f32" || fast_numbers() != FastNumbers::kShortFloats)
+      options.insert(ov::hint::inference_precision(ov::element::f32));
     if (precision == "int8" && model.trunk_int8.empty())
       throw WrongTensor(
           fmt::format("{}: has no eight-bit trunk ('trunk_int8' in model.json); take precision auto or "
@@ -205,12 +231,16 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 
 bool have_openvino() { return true; }
 
-bool has_short_floats() {
+FastNumbers fast_numbers() {
+  const Instructions cpu = instructions();
   try {
     const auto types = core().get_property("CPU", ov::device::capabilities);
-    return std::any_of(types.begin(), types.end(), [](const std::string& t) { return t == "BF16" || t == "FP16"; });
+    const bool short_floats =
+        std::any_of(types.begin(), types.end(), [](const std::string& t) { return t == "BF16" || t == "FP16"; });
+    if (short_floats && (!cpu.intel || cpu.amx)) return FastNumbers::kShortFloats;
+    return cpu.vnni ? FastNumbers::kEightBits : FastNumbers::kNone;
   } catch (const std::exception&) {
-    return false;
+    return FastNumbers::kNone;
   }
 }
 
@@ -226,7 +256,7 @@ Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesyste
 }
 
 bool have_openvino() { return false; }
-bool has_short_floats() { return false; }
+FastNumbers fast_numbers() { return FastNumbers::kNone; }
 
 }  // namespace semvslam
 

@@ -9,13 +9,16 @@
 namespace semvslam {
 namespace {
 
-/// Image in to masks out. SEMVSLAM_MODELS = folder of model.json, SEMVSLAM_IMAGE = any picture; argument: threads.
+/// Image in to masks out. SEMVSLAM_MODELS = folder of model.json, SEMVSLAM_IMAGE = any picture, SEMVSLAM_PRECISION and
+/// SEMVSLAM_WIDTH = instead of the machine's own as in `run`; argument: threads.
 void BM_segment(benchmark::State& state) {
   const char* models = std::getenv("SEMVSLAM_MODELS");
   const char* file = std::getenv("SEMVSLAM_IMAGE");
   SegmenterOptions options;
   options.model = models ? models : "models";
   options.threads = static_cast<int>(state.range(0));
+  if (const char* precision = std::getenv("SEMVSLAM_PRECISION")) options.precision = precision;
+  if (const char* width = std::getenv("SEMVSLAM_WIDTH")) options.input_width_px = std::atoi(width);
   StageTimers timers;
   auto segmenter = make_segmenter(options, RoleTable(), &timers);
   if (!segmenter) return state.SkipWithError(segmenter.error().message.c_str());
