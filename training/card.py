@@ -62,7 +62,7 @@ def main():
 |---|---|
 | `model.json` | describes the graphs; what the program reads first |
 | `trunk.onnx`, `box.onnx`, `mask.onnx` | the three graphs, float32; tensors and every step after them: `training/README.md` |
-| `trunk.int8.xml`, `trunk.int8.bin` | the first graph in eight bits, for OpenVINO on processors without 16-bit floats |
+| `trunk.int8.xml`, `trunk.int8.bin` | the first graph in eight bits, for OpenVINO on processors without fast 16-bit floats |
 | `scores.json`, `training_log.jsonl` | what `evaluate.py` measured; losses during the training |
 | `golden/` | a synthetic picture, what the reference inference makes of it, a frame of our renderer (`people.jpg`), COCO scoring cases: for tests |
 
@@ -97,13 +97,14 @@ Held-out pictures drawn by people (`val.json`, {c['images']} images), seen 768 p
 | person box AP50 | {c['person_bbox_ap50']:.3f} | |
 | all classes, mask AP50 / AP | {c['all_segm_ap50']:.3f} / {c['all_segm_ap']:.3f} | |
 
-Other widths, and eight bits as processors without 16-bit floats run it: `run` takes {size['width']} px in floats and 416 px in eight bits,
-`segment` {size['width']} px in eight bits (near persons: found, mean IoU):
+Other widths, and eight bits as processors without fast 16-bit floats run it: `run` takes {size['width']} px in floats and, in eight bits,
+512 px with instructions for them (VNNI) and 416 px without, `segment` {size['width']} px in eight bits (near persons: found, mean IoU):
 
 | trunk | AP50 | pixel IoU | near persons |
 |---|---|---|---|
 {other_input(f"float, {size['width']} px", s['coco_640'])}
 {other_input(f"eight bits, {size['width']} px", s['coco_int8'])}
+{other_input("eight bits, 512 px", s['coco_int8_512'])}
 {other_input("eight bits, 416 px", s['coco_int8_416'])}
 
 Composed RGB-D sequences (real room, cut-out actors), {size['width']} px in float32, person pixels, medians over frames:
@@ -112,6 +113,12 @@ Composed RGB-D sequences (real room, cut-out actors), {size['width']} px in floa
 |---|---|---|---|---|---|
 """
     out += sequence_rows(s, TARGETS)
+    out += """
+The same in eight bits at 512 px:
+
+| sequence | frames | recall | precision | wanted | empty frames with a false person |
+|---|---|---|---|---|---|
+""" + sequence_rows(s["sequences_int8_512"], TARGETS)
     out += """
 Rendered sequences (other seeds than those trained on: other people, dress, textures, light and camera; the same plan of the room):
 

@@ -51,7 +51,8 @@ def open_model(path, size, int8=False, threads=2):
         return infer.Segmenter(t), t.names
     with open(os.path.join(path, "model.json")) as f:
         m = json.load(f)
-    graphs = infer.OpenVino(path, threads, trunk=m["trunk_int8" if int8 else "trunk"], box=m["box"], mask=m["mask"], size=size)
+    # f32, for scores that do not depend on the processor: OpenVINO takes bfloat16 wherever it exists.
+    graphs = infer.OpenVino(path, threads, "f32", trunk=m["trunk_int8" if int8 else "trunk"], box=m["box"], mask=m["mask"], size=size)
     return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"]), m["classes"]
 
 
