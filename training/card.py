@@ -20,11 +20,15 @@ def num(x):
     return "-" if x is None else f"{x:.3f}"
 
 
-def sequence_rows(scores, wanted):
-    """Table rows of the sequences among the scores."""
-    return "".join(f"| {name} | {v['frames']} | {num(v['recall_median'])} | {num(v['precision_median'])} | {wanted.get(name, '')} | "
+def sequence_table(scores, wanted):
+    """Of the sequences among the scores."""
+    rows = "".join(f"| {name} | {v['frames']} | {num(v['recall_median'])} | {num(v['precision_median'])} | {wanted.get(name, '')} | "
                    f"{v['clear_frames_with_false_person']} of {v['clear_frames']} |\n"
                    for name, v in scores.items() if isinstance(v, dict) and "recall_median" in v)
+    return f"""
+| sequence | frames | recall | precision | wanted | empty frames with a false person |
+|---|---|---|---|---|---|
+{rows}"""
 
 
 def other_input(kind, c):
@@ -108,24 +112,11 @@ Other widths, and eight bits as processors without fast 16-bit floats run it: `r
 {other_input("eight bits, 416 px", s['coco_int8_416'])}
 
 Composed RGB-D sequences (real room, cut-out actors), {size['width']} px in float32, person pixels, medians over frames:
-
-| sequence | frames | recall | precision | wanted | empty frames with a false person |
-|---|---|---|---|---|---|
-"""
-    out += sequence_rows(s, TARGETS)
-    out += """
+{sequence_table(s, TARGETS)}
 The same in eight bits at 512 px:
-
-| sequence | frames | recall | precision | wanted | empty frames with a false person |
-|---|---|---|---|---|---|
-""" + sequence_rows(s["sequences_int8_512"], TARGETS)
-    out += """
+{sequence_table(s["sequences_int8_512"], TARGETS)}
 Rendered sequences (other seeds than those trained on: other people, dress, textures, light and camera; the same plan of the room):
-
-| sequence | frames | recall | precision | wanted | empty frames with a false person |
-|---|---|---|---|---|---|
-""" + sequence_rows(s["rendered"], dict.fromkeys(s["rendered"], "0.90 / 0.90"))
-    out += f"""
+{sequence_table(s["rendered"], dict.fromkeys(s["rendered"], "0.90 / 0.90"))}
 How the two branches' masks are mixed, and how a score is made of box and mask, was chosen on these held-out pictures and some frames of
 the sequences, and the size of the input by both (`training/README.md`): these numbers are therefore a little optimistic. The held-out
 pictures are COCO's, and some may have been among those that the start weights' detector was trained on: there the scores may flatter.

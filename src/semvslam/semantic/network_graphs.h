@@ -68,7 +68,7 @@ bool have_openvino();
 /// In which numbers a processor computes convolutions fast.
 enum class FastNumbers {
   kShortFloats,  // sixteen-bit floats: twice as fast as 32 bits, or more
-  kEightBits,    // products of eight bits in one instruction (VNNI): three times as fast as floats
+  kEightBits,    // products of eight bits in one instruction (VNNI): 1.7 times as fast as floats
   kNone,         // eight bits help, by instructions that were not made for it
 };
 /// Of this processor; kNone without OpenVINO. Intel's AVX-512 multiplies bfloat16 no faster than 32-bit floats, so that

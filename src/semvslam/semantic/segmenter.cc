@@ -24,7 +24,7 @@ class NoSegmenter final : public Segmenter {
 
 // How wide the network sees an image, where the options do not say, in widths of the model's input.
 constexpr double kSlowMachineWidth = 0.65;  // less than half the time; persons near by lose little by it
-constexpr double kEightBitWidth = 0.8;      // on processors with instructions for eight bits: the widest that keeps up
+constexpr double kEightBitWidth = 0.8;      // with instructions for eight bits: keeps up, a fifth to spare
 // Where no camera waits: finds more small persons for half as much time again (in eight bits it does not).
 constexpr double kStillsWidth = 1.2;
 
