@@ -43,6 +43,24 @@ def random_affine(rng, size, canvas, persons, full, plain):
     return affine(scale, roll, mirrored, (w / 2, h / 2), (cx, cy))
 
 
+def clear_affine(rng, size, canvas, boxes, full):
+    """Like random_affine, but so that the canvas shows a part of the image without any of the `boxes`; None if ten tries find none."""
+    h, w = size
+    H, W = canvas
+    fit = min(full[0] / h, full[1] / w)
+    for _ in range(10):
+        scale = fit * np.exp(rng.uniform(0, np.log(3.0)))
+        # The part lies within the image where it can.
+        spare_x, spare_y = max(0.0, w - W / scale) / 2, max(0.0, h - H / scale) / 2
+        source = (w / 2 + rng.uniform(-spare_x, spare_x), h / 2 + rng.uniform(-spare_y, spare_y))
+        m = affine(scale, rng.normal(0, 4), rng.random() < 0.5, source, (W / 2, H / 2))
+        corners = np.array([[[x0, y0], [x1, y0], [x0, y1], [x1, y1]] for x0, y0, x1, y1 in boxes]) @ m[:, :2].T + m[:, 2]
+        low, high = corners.min(1), corners.max(1)
+        if not ((low < (W, H)).all(1) & (high > 0).all(1)).any():
+            return m
+    return None
+
+
 def motion_blur(rng, img):
     n = int(rng.integers(3, 20)) | 1
     k = np.zeros((n, n), np.float32)
@@ -79,8 +97,8 @@ def photometric(rng, img):
     return np.ascontiguousarray(img)
 
 
-def paste(rng, canvas, masks, cut, polygons, person_class):
-    """Draws the body `polygons` of the picture `cut` somewhere onto the canvas; what it hides is cut from `masks`.
+def paste(rng, canvas, masks, cut, polygons):
+    """Draws the body or thing `polygons` of the picture `cut` somewhere onto the canvas; what it hides is cut from `masks`.
 
     Returns the new mask or None. Some bodies are cut off by a straight edge, as by a table or a door frame.
     """

@@ -12,7 +12,10 @@ from . import augment, classes
 
 GREY = 127          # outside the picture: 0 after normalisation
 OBJECT, BOX, IGNORED = 0, 1, 2      # kinds of annotation: with mask, only its box is known, neither object nor background
-WITHOUT_PERSON = 2.5 # how much more often than others a picture without persons is drawn: they are few, and bear the false persons
+WITHOUT_PERSON = 3.5 # how much more often than others a picture without persons is drawn: they are few, and bear the false persons
+CLEAR = 0.1         # this share of the pictures with persons shows a part that holds none
+THINGS = 0.12       # this share gets things cut from other pictures pasted in, animals for the most part
+TEACHER = 0.5       # weight of a mask that another network predicted beside one that was drawn
 SMALLEST = 8        # px; anything smaller on its longer side is neither object nor background
 
 
@@ -41,7 +44,7 @@ def box_only(a, boxes):
 
 
 def load(json_path):
-    """Class names in the network's order, the images, and per image id a list of (class, kind, polygons)."""
+    """Class names in the network's order, the images, and per image id a list of (class, kind, polygons, weight of the mask)."""
     with open(json_path) as f:
         coco = json.load(f)
     names, ids = classes.of_dataset(coco)
@@ -54,7 +57,8 @@ def load(json_path):
             continue
         polygons = [np.asarray(p, np.float64).reshape(-1, 2) for p in a["segmentation"] if len(p) >= 6]
         if polygons:
-            anns.setdefault(a["image_id"], []).append((index[a["category_id"]], kind_of(a, boxes[a["image_id"], a["category_id"]]), polygons))
+            anns.setdefault(a["image_id"], []).append((index[a["category_id"]], kind_of(a, boxes[a["image_id"], a["category_id"]]), polygons,
+                                                     TEACHER if a.get("source", "").startswith("teacher") else 1.0))
     return names, coco["images"], anns
 
 
@@ -81,10 +85,12 @@ class Batches(torch.utils.data.IterableDataset):
                 self.pixels.append(np.ascontiguousarray(p[:, :, ::-1]))
                 self.labels.append(anns.get(im["id"], []))
                 source.append(n)
-        self.bodies = [(i, k) for i, anns in enumerate(self.labels) for k, (c, kind, pol) in enumerate(anns)
-                       if c == 1 and kind == OBJECT and np.ptp(np.concatenate(pol), 0).min() > 40]
-        with_person = np.array([any(c == 1 for c, _, _ in a) for a in self.labels])
-        rare = np.array([any(c != 1 and kind == OBJECT for c, kind, _ in a) for a in self.labels])
+        large = [(i, k, c) for i, anns in enumerate(self.labels) for k, (c, kind, pol, _) in enumerate(anns)
+                 if kind == OBJECT and np.ptp(np.concatenate(pol), 0).min() > 40]
+        self.bodies = [(i, k) for i, k, c in large if c == 1]
+        self.things = [(i, k) for i, k, c in large if c != 1]
+        with_person = np.array([any(c == 1 for c, *_ in a) for a in self.labels])
+        rare = np.array([any(c != 1 and kind == OBJECT for c, kind, *_ in a) for a in self.labels])
         weight = np.where(with_person, 1.0, WITHOUT_PERSON) + 0.3 * rare
         rest = 1 - sum(float(share) for *_, share in sources if share is not None)
         for n, (*_, share) in enumerate(sources):
@@ -96,13 +102,17 @@ class Batches(torch.utils.data.IterableDataset):
         """Warps picture i into `region` (y0 x0 y1 x1) of `out` and adds its objects."""
         y0, x0, y1, x1 = region
         src, anns = self.pixels[i], self.labels[i]
-        persons = [np.r_[np.concatenate(p).min(0), np.concatenate(p).max(0)] for c, kind, p in anns if c == 1 and kind != IGNORED]
-        m = augment.random_affine(rng, src.shape[:2], (y1 - y0, x1 - x0), persons, full, plain)
         h, w = y1 - y0, x1 - x0
+        boxes = [(kind, np.r_[np.concatenate(p).min(0), np.concatenate(p).max(0)]) for c, kind, p, _ in anns if c == 1]
+        m = None
+        if boxes and not plain and rng.random() < CLEAR:
+            m = augment.clear_affine(rng, src.shape[:2], (h, w), [b for _, b in boxes], full)
+        if m is None:
+            m = augment.random_affine(rng, src.shape[:2], (h, w), [b for kind, b in boxes if kind != IGNORED], full, plain)
         fill = (GREY,) * 3 if rng.random() < 0.7 else tuple(int(v) for v in rng.integers(0, 256, 3))
         interp = cv2.INTER_AREA if np.linalg.det(m[:, :2]) ** 2 < 0.2 else cv2.INTER_LINEAR
         out[y0:y1, x0:x1] = cv2.warpAffine(src, m, (w, h), flags=interp, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
-        for c, kind, polygons in anns:
+        for c, kind, polygons, worth in anns:
             moved = [p @ m[:, :2].T + m[:, 2] for p in polygons]
             low, high = np.min([p.min(0) for p in moved], 0), np.max([p.max(0) for p in moved], 0)
             if low[0] >= w or low[1] >= h or high[0] <= 0 or high[1] <= 0:
@@ -111,7 +121,7 @@ class Batches(torch.utils.data.IterableDataset):
             if mask.any():
                 whole = np.zeros(canvas, np.uint8)
                 whole[y0:y1, x0:x1] = mask
-                objects.append([c, kind, whole])
+                objects.append([c, kind, whole, worth])
 
     def sample(self, rng, canvas, plain):
         """plain: in this share of the cases the picture stays nearly as it is."""
@@ -126,21 +136,28 @@ class Batches(torch.utils.data.IterableDataset):
                 self.place(rng, pick(), canvas, out, r, objects, (r[2] - r[0], r[3] - r[1]), plain)
         else:
             self.place(rng, pick(), canvas, out, (0, 0, H, W), objects, self.full, plain)
-        if self.bodies and rng.random() < 0.25 and not plain:
-            for _ in range(int(rng.integers(1, 3))):
-                i, k = self.bodies[rng.integers(len(self.bodies))]
-                body = augment.paste(rng, out, [o[2] for o in objects], self.pixels[i], self.labels[i][k][2], 1)
-                if body is not None:
-                    objects.append([1, OBJECT, body])
         if not plain:
+            if self.bodies and rng.random() < 0.25:
+                self.paste(rng, out, objects, self.bodies)
+            if self.things and rng.random() < THINGS:
+                self.paste(rng, out, objects, self.things)
             out = augment.photometric(rng, out)
         return out, self.targets(objects, canvas)
 
+    def paste(self, rng, out, objects, choice):
+        """Draws one or two of `choice` (picture, object) onto `out` and adds them to the objects."""
+        for _ in range(int(rng.integers(1, 3))):
+            i, k = choice[rng.integers(len(choice))]
+            c, _, polygons, worth = self.labels[i][k]
+            body = augment.paste(rng, out, [o[2] for o in objects], self.pixels[i], polygons)
+            if body is not None:
+                objects.append([c, OBJECT, body, worth])
+
     @staticmethod
     def targets(objects, canvas):
-        boxes, labels, masks, drawn, ignored = [], [], [], [], []
+        boxes, labels, masks, drawn, worths, ignored = [], [], [], [], [], []
         unsure = np.zeros(canvas, np.uint8)
-        for c, kind, mask in objects:
+        for c, kind, mask, worth in objects:
             if not mask.any():
                 continue
             x, y, w, h = cv2.boundingRect(mask)
@@ -152,10 +169,11 @@ class Batches(torch.utils.data.IterableDataset):
                 labels.append(c)
                 masks.append(mask)
                 drawn.append(kind == OBJECT)
+                worths.append(worth)
                 if kind == BOX:
                     unsure |= mask
         t = lambda a, s: torch.from_numpy(np.asarray(a, np.float32).reshape(s))
-        return {"boxes": t(boxes, (-1, 4)), "ignored": t(ignored, (-1, 4)), "labels": torch.tensor(labels, dtype=torch.long), "drawn": torch.tensor(drawn, dtype=torch.bool),
+        return {"boxes": t(boxes, (-1, 4)), "ignored": t(ignored, (-1, 4)), "labels": torch.tensor(labels, dtype=torch.long), "drawn": torch.tensor(drawn, dtype=torch.bool), "worth": t(worths, -1),
                 "masks": torch.from_numpy(np.stack(masks) if masks else np.zeros((0, *canvas), np.uint8)), "unsure": torch.from_numpy(unsure)}
 
     def __iter__(self):

@@ -79,7 +79,7 @@ def dice(p, y, w=None):
 
 
 def mask_losses(model, p, rois, labels, matched, targets):
-    keep, want, offset = [], [], 0
+    keep, want, worth, offset = [], [], [], 0
     for b, t in enumerate(targets):
         n = len(matched[b])
         i = (labels[offset:offset + n] > 0).nonzero()[:, 0]
@@ -91,13 +91,15 @@ def mask_losses(model, p, rois, labels, matched, targets):
             r = torch.cat((which.float()[:, None], rois[offset + i][:, 1:]), 1)
             want.append((roi_align(m, r, 28, 1.0, 2, True)[:, 0] >= 0.5).float())
             keep.append(offset + i)
+            worth.append(t["worth"][matched[b][i]])
         offset += n
     if not keep:
         return torch.zeros(()), 0
-    keep, want = torch.cat(keep), torch.cat(want).flatten(1)
+    keep, want, worth = torch.cat(keep), torch.cat(want).flatten(1), torch.cat(worth)
     logits = model.mask_head(p, rois[keep]).float()
     logits = logits[torch.arange(len(keep)), (labels[keep] != 1).long()].flatten(1)
-    return F.binary_cross_entropy_with_logits(logits, want) + 0.5 * dice(logits.sigmoid(), want).mean(), len(keep)
+    loss = F.binary_cross_entropy_with_logits(logits, want, reduction="none").mean(1) + 0.5 * dice(logits.sigmoid(), want)
+    return (loss * worth).sum() / worth.sum(), len(keep)
 
 
 def semantic_loss(logits, targets, movers):
