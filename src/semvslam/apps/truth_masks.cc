@@ -32,15 +32,17 @@ class FolderTruth final : public TruthMaskSink {
     for (const Keypoint& k : whole_.keypoints) {
       const cv::Point2f pixel(k.x_px, k.y_px);
       if (is_masked(moving, pixel)) continue;
-      const bool dropped = is_masked(result.dynamic->moving, pixel);
+      const bool dropped = is_masked(result.dynamic->left_out, pixel);
       counts_.static_dropped.count(dropped);
       if (!is_masked(near_moving, pixel)) counts_.clear_static_dropped.count(dropped);
     }
     // Single points outside every mask and region are dropped too.
     for (const FeatureMark& mark : result.dynamic->features) {
-      if (is_masked(moving, mark.pixel) || is_masked(result.dynamic->moving, mark.pixel)) continue;
-      if (mark.use != kNotUsed) counts_.static_barred.count(mark.use == kKnownLandmarkOnly && !mark.tracked);
-      if (mark.reason != FeatureReason::kPointMotion) continue;
+      if (is_masked(moving, mark.pixel) || is_masked(result.dynamic->left_out, mark.pixel)) continue;
+      if (mark.use != kNotUsed) {
+        counts_.static_barred.count(mark.use == kKnownLandmarkOnly && !mark.tracked);
+        continue;
+      }
       ++counts_.static_dropped.part;
       counts_.clear_static_dropped.part += !is_masked(near_moving, mark.pixel);
     }

@@ -51,7 +51,8 @@ struct DynamicFilter::State {
   bool masks(std::size_t instance) const;
   cv::Mat watched_parts(double time_s) const;
   void find_moving_instances(double time_s);
-  void mark_features(std::span<const cv::Point2f> pixels);
+  void mark_features();
+  void doubt_outlines();
   void doubt_near_movers();
   void open_if_needed(std::span<const float> depths_m);
   void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
@@ -69,10 +70,11 @@ struct DynamicFilter::State {
   std::optional<SE3> cur_from_prev;
   Segmentation segmentation;
   std::size_t masked_instances = 0;  // the best so many of segmentation.instances mask; fewer when the filter opened
-  cv::Mat excluded;                  // what is left out for its class
+  cv::Mat excluded;                  // what is left out for its class, its outline included
+  cv::Mat cores;                     // the same without the outline
   bool movers_avoided = true;        // false when the filter opened
   cv::Mat expected_movers;           // where what moved in the last frame should be now
-  cv::Mat avoided;                   // both: what features are not extracted from
+  cv::Mat avoided;                   // cores and movers: what features are not extracted from
   MotionResult motion_result;
   double last_time_s = 0;                // of motion_result
   cv::Mat regions_mask, instances_mask;  // moving things of no class; moving instances of movable classes
@@ -88,7 +90,7 @@ struct DynamicFilter::State {
     return std::find_if(moved.begin(), moved.end(),
                         [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
   }
-  std::vector<MotionVerdict> verdicts;  // scratch
+  std::vector<PointVerdict> verdicts;  // scratch
   SideTask following;                   // of the point tracks into the present frame; last, so that it ends first
 };
 
@@ -177,14 +179,18 @@ void DynamicFilter::State::compose_mask() {
     else
       cv::bitwise_or(excluded, frame.mask, excluded);
   }
-  if (!excluded.empty()) grow_mask(excluded, options.dilate_px);
+  cores = cv::Mat();
+  if (!excluded.empty()) {
+    cores = without_rim(excluded, options.dilate_px);
+    grow_mask(excluded, options.dilate_px);
+  }
   record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
-  avoided = excluded;
+  avoided = cores;
   if (expected_movers.empty() || !movers_avoided) return;
-  if (excluded.empty())
+  if (cores.empty())
     avoided = expected_movers;
   else
-    cv::bitwise_or(excluded, expected_movers, avoided = cv::Mat());
+    cv::bitwise_or(cores, expected_movers, avoided = cv::Mat());
 }
 
 /// Features on what motion has found would be thrown away; the static scene shall have them. Where a mover is expected
@@ -246,7 +252,11 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.features.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) record.features[i].pixel = pixels[i];
   record.moving = s.excluded;
-  if (!s.motion) return s.usable;
+  record.left_out = s.cores;
+  if (!s.motion) {
+    s.doubt_outlines();
+    return s.usable;
+  }
 
   MotionFrame frame = s.motion_frame();
   frame.corners = pixels;
@@ -260,7 +270,8 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
     ++record.track_reasons[static_cast<std::size_t>(track.reason)];
   record.moving_regions = static_cast<int>(s.motion_result.regions.size());
   s.add_moving_things(frame.time_s);
-  s.mark_features(pixels);
+  s.mark_features();
+  s.doubt_outlines();
   s.doubt_near_movers();
   s.open_if_needed(depths_m);
   return s.usable;
@@ -271,12 +282,16 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   instances_mask = cv::Mat();
   find_moving_instances(time_s);
   if (regions_mask.empty() && instances_mask.empty()) return;
-  // The exclusion mask stays as it was extracted with; the record gets everything.
+  // The masks stay as features were extracted with; the record gets everything.
   record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
+  record->left_out = cores.empty() ? cv::Mat::zeros(size, CV_8UC1) : cores.clone();
   for (cv::Mat* mask : {&regions_mask, &instances_mask}) {
     if (mask->empty()) continue;
-    grow_mask(*mask, options.dilate_px);
-    cv::bitwise_or(record->moving, *mask, record->moving);
+    cv::Mat whole = mask->clone();
+    grow_mask(whole, options.dilate_px);
+    cv::bitwise_or(record->moving, whole, record->moving);
+    *mask = without_rim(*mask, options.dilate_px);
+    cv::bitwise_or(record->left_out, *mask, record->left_out);
   }
 }
 
@@ -328,18 +343,34 @@ void DynamicFilter::State::find_moving_instances(double time_s) {
   }
 }
 
-void DynamicFilter::State::mark_features(std::span<const cv::Point2f> pixels) {
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
+void DynamicFilter::State::mark_features() {
+  for (std::size_t i = 0; i < record->features.size(); ++i) {
     FeatureMark& mark = record->features[i];
+    const auto [verdict, sure] = verdicts[i];
     if (is_masked(instances_mask, mark.pixel))
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingInstance;
-    else if (is_masked(regions_mask, mark.pixel))
+    else if (is_masked(regions_mask, mark.pixel) ||
+             (verdict == MotionVerdict::kMoving && is_masked(motion_result.mask, mark.pixel)))
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kMovingRegion;
-    else if (verdicts[i] == MotionVerdict::kMoving)
+    else if (verdict == MotionVerdict::kMoving)
       mark.verdict = FeatureVerdict::kMoving, mark.reason = FeatureReason::kPointMotion;
-    else if (verdicts[i] == MotionVerdict::kStatic)
+    else if (verdict == MotionVerdict::kStatic)
       mark.verdict = FeatureVerdict::kStatic, mark.reason = FeatureReason::kNone;
-    usable[i] = mark.verdict == FeatureVerdict::kMoving ? kNotUsed : kFullyUsed;
+    if (mark.verdict != FeatureVerdict::kMoving)
+      usable[i] = kFullyUsed;
+    else  // what moves beside it may be another surface
+      usable[i] = mark.reason == FeatureReason::kPointMotion && !sure ? kKnownLandmarkOnly : kNotUsed;
+  }
+}
+
+/// A corner on the outline of something that moves may be made by it or lie behind it, and its descriptor sees both
+/// sides. A known landmark that looks like it, where it should be, tells; but no landmark may come from it.
+void DynamicFilter::State::doubt_outlines() {
+  for (std::size_t i = 0; i < record->features.size(); ++i) {
+    FeatureMark& mark = record->features[i];
+    if (mark.verdict == FeatureVerdict::kMoving || !is_masked(record->moving, mark.pixel)) continue;
+    mark.reason = FeatureReason::kAtOutline;
+    usable[i] = kKnownLandmarkOnly;
   }
 }
 
@@ -354,7 +385,7 @@ void DynamicFilter::State::doubt_near_movers() {
   reach.spread();
   for (std::size_t i = 0; i < record->features.size(); ++i) {
     FeatureMark& mark = record->features[i];
-    if (mark.verdict == FeatureVerdict::kMoving) continue;
+    if (mark.verdict == FeatureVerdict::kMoving || mark.reason == FeatureReason::kAtOutline) continue;
     const bool tested = mark.verdict == FeatureVerdict::kStatic;
     const bool near = reach.distance_m(mark.pixel) <= (tested ? options.rest_reach_m : options.reach_m) ||
                       (!tested && reach.is_at_edge(mark.pixel));
@@ -376,6 +407,7 @@ void DynamicFilter::State::open_if_needed(std::span<const float> depths_m) {
   // known.
   std::replace(usable.begin(), usable.end(), std::uint8_t{kNotUsed}, std::uint8_t{kKnownLandmarkOnly});
   record->moving = excluded;
+  record->left_out = cores;
   record->fail_open = FailOpen::kMotion;
 }
 

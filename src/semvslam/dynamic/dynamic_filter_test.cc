@@ -94,7 +94,7 @@ TEST(DynamicFilter, WithoutEvidenceNothingIsLeftOut) {
   EXPECT_EQ(filter.record()->mask_source, MaskSource::kNone);
 }
 
-TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedAndGrown) {
+TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedWithAnOutlineOfDoubt) {
   DynamicOptions options = with("masks", false);
   options.dilate_px = 3;
   options.fit.band_px = 0;  // the pictures' depth knows nothing of this person
@@ -105,16 +105,31 @@ TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedAndGrown) {
   const Segmentation segmentation =
       make_segmentation(frame.id, {person, make_instance(Role::kMovable, {200, 40, 50, 60}, 0.9f)});
   filter.begin(frame, &segmentation, std::nullopt);
-  cv::Mat expected = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
-  expected(cv::Rect(37, 37, 56, 36)).setTo(255);
-  EXPECT_EQ(cv::norm(filter.excluded(), expected, cv::NORM_INF), 0);
+  cv::Mat core = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
+  core(cv::Rect(42, 42, 46, 26)).setTo(255);
+  EXPECT_EQ(cv::norm(filter.excluded(), core, cv::NORM_INF), 0);
   EXPECT_EQ(filter.record()->mask_source, MaskSource::kSegmented);
+
+  const std::vector<cv::Point2f> pixels{{41, 50}, {38, 50}, {36, 50}, {220, 60}};
+  const std::vector<std::uint8_t> usable = filter.judge(pixels, std::vector<float>(pixels.size(), 3.f));
+  EXPECT_EQ(usable, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kKnownLandmarkOnly, kFullyUsed, kFullyUsed}));
+  EXPECT_EQ(filter.record()->features[0].reason, FeatureReason::kAtOutline);
+  EXPECT_EQ(cv::norm(filter.record()->left_out, core, cv::NORM_INF), 0);
+  cv::Mat grown = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
+  grown(cv::Rect(37, 37, 56, 36)).setTo(255);
+  EXPECT_EQ(cv::norm(filter.record()->moving, grown, cv::NORM_INF), 0);
 
   options.masks = "boxes";
   DynamicFilter boxes(small_camera(), options);
   boxes.begin(frame, &segmentation, std::nullopt);
-  expected(cv::Rect(37, 37, 56, 66)).setTo(255);
-  EXPECT_EQ(cv::norm(boxes.excluded(), expected, cv::NORM_INF), 0);
+  core(cv::Rect(42, 42, 46, 56)).setTo(255);
+  EXPECT_EQ(cv::norm(boxes.excluded(), core, cv::NORM_INF), 0);
+
+  options.dilate_px = 0;
+  DynamicFilter sharp(small_camera(), options);
+  sharp.begin(frame, &segmentation, std::nullopt);
+  core(cv::Rect(40, 40, 50, 60)).setTo(255);
+  EXPECT_EQ(cv::norm(sharp.excluded(), core, cv::NORM_INF), 0) << "no doubt, no outline";
 }
 
 TEST(DynamicFilter, AGivenMaskCountsInEveryMode) {

@@ -22,6 +22,8 @@ std::string_view to_string(FeatureReason reason) {
       return "no_evidence";
     case FeatureReason::kNearMoving:
       return "near_moving";
+    case FeatureReason::kAtOutline:
+      return "at_outline";
     case FeatureReason::kPointMotion:
       return "point_motion";
     case FeatureReason::kMovingRegion:

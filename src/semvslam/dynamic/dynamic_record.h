@@ -19,11 +19,12 @@ enum class FeatureReason : std::uint8_t {
   kNone,            // static: nothing speaks against it
   kNoEvidence,      // unknown: no test could be made
   kNearMoving,      // unknown or static: it may be a part of something that moves, which its mask lacks
+  kAtOutline,       // unknown or static: on the outline of something that moves, with which it may move
   kPointMotion,     // moving: the point track beside it moves (its reason: DynamicRecord::track_reasons)
   kMovingRegion,    // moving: on a thing of no known class that moves, or did a moment ago
   kMovingInstance,  // moving: on an instance of a movable class, enough of whose points move
 };
-inline constexpr std::size_t kFeatureReasons = 6;
+inline constexpr std::size_t kFeatureReasons = 7;
 inline constexpr std::size_t kMotionReasons = static_cast<std::size_t>(MotionReason::kMemory) + 1;
 std::string_view to_string(FeatureVerdict verdict);
 std::string_view to_string(FeatureReason reason);
@@ -77,6 +78,7 @@ struct DynamicRecord {
   int moving_regions = 0;                           // moving things of no known class
   double masked_share = 0;                          // of the image's pixels, before features are extracted
   cv::Mat moving;                                   // CV_8UC1, 255 = pixel of something that moves or may; empty = none
+  cv::Mat left_out;  // the same without the outlines: the pixels that no feature is used of
   std::vector<FeatureMark> features;
 
   int count(FeatureVerdict v) const { return verdicts[static_cast<std::size_t>(v)]; }

@@ -83,4 +83,11 @@ void grow_mask(cv::Mat& mask, int reach_px) {
   cv::dilate(part, part, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
 }
 
+cv::Mat without_rim(const cv::Mat& mask, int rim_px) {
+  if (rim_px <= 0) return mask.clone();
+  cv::Mat inside;
+  cv::erode(mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {2 * rim_px + 1, 2 * rim_px + 1}));
+  return inside;
+}
+
 }  // namespace semvslam

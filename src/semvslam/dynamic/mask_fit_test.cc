@@ -69,5 +69,16 @@ TEST(GrowMask, ReachesAsFarAsSaidAndNotAcrossTheBorder) {
   EXPECT_EQ(cv::countNonZero(nothing), 0);
 }
 
+TEST(MaskWithoutRim, LosesItsRimButNotTheImagesBorder) {
+  cv::Mat mask = cv::Mat::zeros(20, 30, CV_8UC1);
+  mask(cv::Rect(0, 5, 10, 10)).setTo(255);
+  cv::Mat expected = cv::Mat::zeros(mask.size(), CV_8UC1);
+  expected(cv::Rect(0, 7, 8, 6)).setTo(255);
+  EXPECT_EQ(cv::norm(without_rim(mask, 2), expected, cv::NORM_INF), 0);
+  cv::Mat same = without_rim(mask, 0);
+  EXPECT_EQ(cv::norm(same, mask, cv::NORM_INF), 0);
+  EXPECT_NE(same.data, mask.data) << "a mask of its own";
+}
+
 }  // namespace
 }  // namespace semvslam

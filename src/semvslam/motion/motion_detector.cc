@@ -9,6 +9,7 @@ namespace semvslam {
 namespace {
 
 constexpr float kJudgeRadiusPx = 12;       // a feature takes the verdict of a track as near as that
+constexpr float kSureRadiusPx = 4;         // half the side of the patch that is tracked: farther away is not part of it
 constexpr float kAlikeDepthShare = 0.05f;  // and as deep as that, share of the depth
 
 double ms_since(std::chrono::steady_clock::time_point& start) {
@@ -58,9 +59,8 @@ MotionResult MotionDetector::step(const MotionFrame& frame) {
 }
 
 void MotionDetector::judge(std::span<const cv::Point2f> pixels, std::span<const float> depths_m,
-                           std::vector<MotionVerdict>& verdicts) const {
-  verdicts.assign(pixels.size(), MotionVerdict::kUnknown);
-  if (last_.mask.empty()) return;
+                           std::vector<PointVerdict>& verdicts) const {
+  verdicts.assign(pixels.size(), {});
   // Tracks with a verdict by square of the image as wide as the radius: those around are in the nine next to it.
   struct Judged {
     float x, y, depth_m;
@@ -83,12 +83,6 @@ void MotionDetector::judge(std::span<const cv::Point2f> pixels, std::span<const 
     square = static_cast<int>(judged.size()) - 1;
   }
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const int x = std::clamp(static_cast<int>(std::lround(pixels[i].x)), 0, camera_.width_px - 1);
-    const int y = std::clamp(static_cast<int>(std::lround(pixels[i].y)), 0, camera_.height_px - 1);
-    if (last_.mask.at<std::uint8_t>(y, x)) {
-      verdicts[i] = MotionVerdict::kMoving;
-      continue;
-    }
     float nearest = kJudgeRadiusPx * kJudgeRadiusPx;  // squared
     const int middle = square_of(std::clamp(pixels[i].x, 0.f, static_cast<float>(camera_.width_px - 1)),
                                  std::clamp(pixels[i].y, 0.f, static_cast<float>(camera_.height_px - 1)));
@@ -98,11 +92,10 @@ void MotionDetector::judge(std::span<const cv::Point2f> pixels, std::span<const 
         k = track.next;
         const float dx = track.x - pixels[i].x, dy = track.y - pixels[i].y, squared = dx * dx + dy * dy;
         if (squared >= nearest) continue;
-        if (depths_m[i] > 0 && track.depth_m > 0 &&
-            std::abs(depths_m[i] - track.depth_m) > kAlikeDepthShare * track.depth_m)
-          continue;
+        const bool measured = depths_m[i] > 0 && track.depth_m > 0;
+        if (measured && std::abs(depths_m[i] - track.depth_m) > kAlikeDepthShare * track.depth_m) continue;
         nearest = squared;
-        verdicts[i] = track.verdict;
+        verdicts[i] = {track.verdict, measured && squared < kSureRadiusPx * kSureRadiusPx};
       }
   }
 }

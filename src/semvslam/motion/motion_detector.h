@@ -31,6 +31,12 @@ struct MotionResult {
   double flow_ms = 0, check_ms = 0, regions_ms = 0;
 };
 
+/// Verdict on a point that is no track itself.
+struct PointVerdict {
+  MotionVerdict verdict = MotionVerdict::kUnknown;
+  bool sure = false;  // it is the track's own surface: a few pixels from it and as deep
+};
+
 /// Motion consistency of one camera stream, all parts together: tracks, verdicts, regions. Frames in order, one thread.
 class MotionDetector {
  public:
@@ -46,11 +52,11 @@ class MotionDetector {
   void set_pose(FrameId frame, const SE3& camera_from_world) { check_.set_pose(frame, camera_from_world); }
   void forget_poses() { check_.forget_poses(); }
 
-  /// Verdicts for points of the last frame that are no tracks themselves (features): moving inside a region; else as
-  /// the nearest track within 12 px whose depth is alike; else unknown.
+  /// Verdicts for points of the last frame that are no tracks themselves (features): as the nearest track within 12 px
+  /// whose depth is alike; else unknown. Regions are not asked.
   /// @param pixels recorded. @param depths_m as many, 0 = not measured. @param verdicts is resized.
   void judge(std::span<const cv::Point2f> pixels, std::span<const float> depths_m,
-             std::vector<MotionVerdict>& verdicts) const;
+             std::vector<PointVerdict>& verdicts) const;
 
  private:
   Camera camera_;

@@ -48,13 +48,24 @@ TEST(MotionDetector, FindsAnUnknownThingInImages) {
   EXPECT_LT(cv::countNonZero(result.mask) - cv::countNonZero(result.mask(film.box)), 0.2 * film.box.area());
   ASSERT_EQ(result.check.tracks.size(), detector.tracks().size());
 
-  const std::vector<cv::Point2f> pixels{{static_cast<float>(film.box.x + 80), 230}, {60, 400}};
-  const std::vector<float> depths{1.5f, 3.f};
-  std::vector<MotionVerdict> verdicts;
+  const Eigen::Vector2f on_track = detector.tracks().front().newest().pixel;
+  const float track_depth_m = detector.tracks().front().newest().depth_m;
+  const std::vector<cv::Point2f> pixels{{static_cast<float>(film.box.x + 80), 230},
+                                        {60, 400},
+                                        {on_track.x(), on_track.y()},
+                                        {on_track.x(), on_track.y()}};
+  const std::vector<float> depths{1.5f, 3.f, track_depth_m, 0};
+  std::vector<PointVerdict> verdicts;
   detector.judge(pixels, depths, verdicts);
-  ASSERT_EQ(verdicts.size(), 2u);
-  EXPECT_EQ(verdicts[0], MotionVerdict::kMoving);
-  EXPECT_NE(verdicts[1], MotionVerdict::kMoving);
+  ASSERT_EQ(verdicts.size(), 4u);
+  EXPECT_EQ(verdicts[0].verdict, MotionVerdict::kMoving);
+  EXPECT_TRUE(verdicts[0].sure) << "in a region";
+  EXPECT_NE(verdicts[1].verdict, MotionVerdict::kMoving);
+  ASSERT_EQ(result.check.tracks.front().verdict, MotionVerdict::kStatic);
+  EXPECT_EQ(verdicts[2].verdict, MotionVerdict::kStatic);
+  EXPECT_TRUE(verdicts[2].sure);
+  EXPECT_EQ(verdicts[3].verdict, MotionVerdict::kStatic);
+  EXPECT_FALSE(verdicts[3].sure) << "no depth says that it is the same surface";
 }
 
 TEST(MotionDetector, ABoxAtRestIsNothing) {
