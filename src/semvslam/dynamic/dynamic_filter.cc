@@ -91,7 +91,7 @@ struct DynamicFilter::State {
                         [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
   }
   std::vector<PointVerdict> verdicts;  // scratch
-  SideTask following;                   // of the point tracks into the present frame; last, so that it ends first
+  SideTask following;                  // of the point tracks into the present frame; last, so that it ends first
 };
 
 DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options)
@@ -172,18 +172,15 @@ void DynamicFilter::State::compose_mask() {
     paint(excluded, segmentation.instances[i], boxes);
   }
   if (!excluded.empty() && !boxes) fit_to_depth(excluded, frame.depth, metres_per_unit, options.fit);
-  if (!frame.mask.empty()) {
+  cores = excluded.empty() ? cv::Mat() : without_rim(excluded, options.dilate_px);
+  if (!frame.mask.empty()) {  // its outline is the caller's word
     if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
-    if (excluded.empty())
-      excluded = frame.mask.clone();
-    else
-      cv::bitwise_or(excluded, frame.mask, excluded);
+    for (cv::Mat* mask : {&cores, &excluded}) {
+      if (mask->empty()) *mask = cv::Mat::zeros(size, CV_8UC1);
+      mask->setTo(255, frame.mask);
+    }
   }
-  cores = cv::Mat();
-  if (!excluded.empty()) {
-    cores = without_rim(excluded, options.dilate_px);
-    grow_mask(excluded, options.dilate_px);
-  }
+  if (!excluded.empty()) grow_mask(excluded, options.dilate_px);
   record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
   avoided = cores;
   if (expected_movers.empty() || !movers_avoided) return;
@@ -290,7 +287,8 @@ void DynamicFilter::State::add_moving_things(double time_s) {
     cv::Mat whole = mask->clone();
     grow_mask(whole, options.dilate_px);
     cv::bitwise_or(record->moving, whole, record->moving);
-    *mask = without_rim(*mask, options.dilate_px);
+    // An instance was seen as a whole before it moved: landmarks are on it.
+    if (mask == &regions_mask) *mask = without_rim(*mask, options.dilate_px);
     cv::bitwise_or(record->left_out, *mask, record->left_out);
   }
 }

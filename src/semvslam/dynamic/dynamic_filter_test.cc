@@ -106,11 +106,11 @@ TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedWithAnOutlineOfDoubt) {
       make_segmentation(frame.id, {person, make_instance(Role::kMovable, {200, 40, 50, 60}, 0.9f)});
   filter.begin(frame, &segmentation, std::nullopt);
   cv::Mat core = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
-  core(cv::Rect(42, 42, 46, 26)).setTo(255);
+  core(cv::Rect(43, 43, 44, 24)).setTo(255);
   EXPECT_EQ(cv::norm(filter.excluded(), core, cv::NORM_INF), 0);
   EXPECT_EQ(filter.record()->mask_source, MaskSource::kSegmented);
 
-  const std::vector<cv::Point2f> pixels{{41, 50}, {38, 50}, {36, 50}, {220, 60}};
+  const std::vector<cv::Point2f> pixels{{42, 50}, {38, 50}, {36, 50}, {220, 60}};
   const std::vector<std::uint8_t> usable = filter.judge(pixels, std::vector<float>(pixels.size(), 3.f));
   EXPECT_EQ(usable, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kKnownLandmarkOnly, kFullyUsed, kFullyUsed}));
   EXPECT_EQ(filter.record()->features[0].reason, FeatureReason::kAtOutline);
@@ -122,7 +122,7 @@ TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedWithAnOutlineOfDoubt) {
   options.masks = "boxes";
   DynamicFilter boxes(small_camera(), options);
   boxes.begin(frame, &segmentation, std::nullopt);
-  core(cv::Rect(42, 42, 46, 56)).setTo(255);
+  core(cv::Rect(43, 43, 44, 54)).setTo(255);
   EXPECT_EQ(cv::norm(boxes.excluded(), core, cv::NORM_INF), 0);
 
   options.dilate_px = 0;
@@ -189,12 +189,13 @@ std::shared_ptr<const DynamicRecord> move_board(DynamicFilter& filter, int step_
 TEST(DynamicFilter, AMovingThingOfNoClassIsFoundByMotionAlone) {
   DynamicFilter filter(small_camera(), with("off", true));
   const auto record = move_board(filter, 4, false);
-  int moving_on_board = 0, on_board = 0, moving_on_wall = 0, on_wall = 0;
-  const cv::Rect board(60 + 11 * 4, 70, 80, 100);
+  int moving_on_board = 0, on_board = 0, used_on_board = 0, moving_on_wall = 0, on_wall = 0;
+  const cv::Rect board(60 + 11 * 4, 70, 80, 100), inside(board.x + 4, board.y + 4, board.width - 8, board.height - 8);
   const cv::Rect near_board(board.x - 14, board.y - 14, board.width + 28, board.height + 28);
   for (const FeatureMark& mark : record->features) {
     const bool moving = mark.verdict == FeatureVerdict::kMoving;
-    if (board.contains(mark.pixel)) {
+    if (board.contains(mark.pixel)) used_on_board += mark.use == kFullyUsed;
+    if (inside.contains(mark.pixel)) {
       ++on_board;
       moving_on_board += moving;
     } else if (!near_board.contains(mark.pixel)) {
@@ -203,6 +204,7 @@ TEST(DynamicFilter, AMovingThingOfNoClassIsFoundByMotionAlone) {
     }
   }
   EXPECT_GT(moving_on_board, on_board * 9 / 10);
+  EXPECT_LE(used_on_board, on_board / 20) << "what is not known to move lies at the outline";
   EXPECT_LE(moving_on_wall, on_wall / 100);
   EXPECT_GE(record->moving_regions, 1);
 }
