@@ -279,7 +279,7 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   instances_mask = cv::Mat();
   find_moving_instances(time_s);
   if (regions_mask.empty() && instances_mask.empty()) return;
-  // The masks stay as features were extracted with; the record gets everything.
+  // What was extracted with stays as it was; the record gets everything.
   record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
   record->left_out = cores.empty() ? cv::Mat::zeros(size, CV_8UC1) : cores.clone();
   for (cv::Mat* mask : {&regions_mask, &instances_mask}) {

@@ -19,7 +19,9 @@ struct DynamicOptions {
   std::string masks = "off";  // off; boxes: whole boxes of instances of dynamic classes; masks: their pixels
   bool motion = false;        // motion consistency
   MaskFitOptions fit;         // of the masks' outlines to the depth image
-  int dilate_px = 4;          // masks grow by this: the descriptor of a corner on the outline sees both sides
+  /// An outline is that broad inwards and outwards: it may be off, and the descriptor of a corner on it sees both
+  /// sides. No landmark comes from there.
+  int dilate_px = 4;
   /// A feature that no motion test was made for and that hangs on something that moves may be a limb that the mask
   /// lacks: no landmark may come from it. Along the surface; an arm or a leg is that long; 0 = off.
   double reach_m = 0.6;

@@ -11,7 +11,8 @@ void DynamicOptions::add_to(ConfigSchema& s) {
   s.add("dynamic.fit_tolerance_m", &fit.tolerance_m, {0.01, 10},
         "depth that is that near to a thing's belongs to it, m");
   s.add("dynamic.fit_reach_px", &fit.reach_px, {4, 1000}, "window over which the depth of a thing is averaged, px");
-  s.add("dynamic.dilate_px", &dilate_px, {0, 50}, "masks grow by this, px");
+  s.add("dynamic.dilate_px", &dilate_px, {0, 50},
+        "so far from the outline of a mask, inwards and outwards, features only find known landmarks, px");
   s.add("dynamic.reach_m", &reach_m, {0, 5},
         "no landmark comes from an untested feature that near, along the surface, to something that moves, m; 0 = off");
   s.add("dynamic.rest_reach_m", &rest_reach_m, {0, 5}, "the same for features that were seen to be at rest, m");

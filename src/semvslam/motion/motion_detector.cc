@@ -9,7 +9,7 @@ namespace semvslam {
 namespace {
 
 constexpr float kJudgeRadiusPx = 12;       // a feature takes the verdict of a track as near as that
-constexpr float kSureRadiusPx = 4;         // half the side of the patch that is tracked: farther away is not part of it
+constexpr float kSureRadiusPx = 4;         // well within the patch that is tracked
 constexpr float kAlikeDepthShare = 0.05f;  // and as deep as that, share of the depth
 
 double ms_since(std::chrono::steady_clock::time_point& start) {
