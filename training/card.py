@@ -77,15 +77,17 @@ SSDLite detector trained on COCO (TensorFlow's, Apache-2.0; `coco_backbone.py`).
 Clothing Co-Parsing and a human-segmentation set; many masks were predicted by another network from drawn boxes. No picture of
 the composed sequences' room was trained on, nor those that their person actors were cut from (the pictures of the carried chair and
 suitcase are among the training pictures). Frames of rooms with people drawn by our own renderer (`render_people.py`) came with the
-second stage: 636 up to the fourth run, {rendered} of other seeds in the last; their chairs, books and cups are not labelled.
+second stage: 636 up to the fourth run, 371 of other seeds in the fifth, {rendered} in the last; their chairs, books and cups are not labelled.
 
 ## Training
 {steps} steps, {seen} augmented pictures seen (about {seen / PICTURES:.0f} passes) in {len(runs)} runs on two CPU cores, learning rate annealed by the
 clock in each. From the middle of the second run on a part of the pictures is rendered (a tenth to a quarter). The first four runs had
 another backbone (of a DeepLabv3 trained on PASCAL VOC); the fourth had larger pictures, masks drawn by COCO's rule, persons of whom only
-a box was drawn, and milder augmentation. In the last run ({last_seen} pictures) the COCO detector's backbone took its place: the lateral
-convolutions of the pyramid were fitted to it, so that pyramid and heads went on from what they had learnt (`training/README.md`). The
-leading five blocks of the backbone (up to the first at stride 8) keep their start weights, before the fourth run the leading seven.
+a box was drawn, and milder augmentation. In the fifth the COCO detector's backbone took its place: the lateral convolutions of the
+pyramid were fitted to it, so that pyramid and heads went on from what they had learnt (`training/README.md`). The last run ({last_seen}
+pictures) saw more of what is no person: parts of pictures without the persons in them, animals and things pasted in; predicted masks
+weighed half. The leading five blocks of the backbone (up to the first at stride 8) keep their start weights, before the fourth run the
+leading seven. The graphs' weights have seven bits of mantissa, as bfloat16.
 
 ## Scores (training/evaluate.py, OpenVINO in float32; person pixels at score >= {c['score_threshold']})
 Held-out pictures drawn by people (`val.json`, {c['images']} images), seen 768 px wide, as `segment` and `eval-seg` do:

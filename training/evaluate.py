@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Scores exported graphs (or a check point): COCO mask AP, person pixels, near persons; composed sequences.
 
-usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--drawn N] [--sequence DIR ...] [--score 0.45] [--json OUT]
+usage: evaluate.py MODEL_DIR|CHECKPOINT --coco JSON IMAGES [--drawn N] [--sequence DIR ...] [--score S] [--json OUT]
 """
 import argparse
 import contextlib
@@ -166,7 +166,7 @@ def main():
     a.add_argument("--drawn", type=int, default=0, metavar="N", help="only the first N pictures in which people drew a person")
     a.add_argument("--sequence", nargs="*", default=[])
     a.add_argument("--step", type=int, default=5, help="every so many frames of a sequence")
-    a.add_argument("--score", type=float, default=infer.SURE)
+    a.add_argument("--score", type=float, help="least score of a person; default: as the program's, of stills and of sequences")
     a.add_argument("--size", help="of the network's input, height x width; default: as exported, 480x640 for a check point")
     a.add_argument("--int8", action="store_true", help="the trunk in INT8")
     a.add_argument("--json")
@@ -174,9 +174,9 @@ def main():
     seg, names = open_model(o.model, o.size, o.int8)
     out = {"model": os.path.basename(os.path.normpath(o.model))}
     if o.coco:
-        out["coco"] = score_coco(seg, names, *o.coco, o.score, o.drawn)
+        out["coco"] = score_coco(seg, names, *o.coco, o.score or infer.SURE_OF_STILLS, o.drawn)
     for s in o.sequence:
-        out[os.path.basename(os.path.normpath(s))] = score_sequence(seg, s, o.score, o.step)
+        out[os.path.basename(os.path.normpath(s))] = score_sequence(seg, s, o.score or infer.SURE, o.step)
     print(json.dumps(out, indent=1))
     if o.json:
         with open(o.json, "w") as f:

@@ -23,7 +23,8 @@ GREY = 127
 PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.48     # of persons' masks
-SURE = 0.45                                     # least score: even odds, and a mask as sure as good ones are (0.9)
+SURE = 0.45                                     # least score beside a camera: even odds, and a mask as sure as good ones are (0.9)
+SURE_OF_STILLS = 0.55                           # of single pictures: nothing comes after it that would see a false person
 
 
 def size_of(text):
@@ -268,7 +269,7 @@ def main():
     a.add_argument("models")
     a.add_argument("images", nargs="+")
     a.add_argument("--out")
-    a.add_argument("--score", type=float, default=SURE)
+    a.add_argument("--score", type=float, default=SURE_OF_STILLS)
     a.add_argument("--threads", type=int, default=2)
     o = a.parse_args()
     with open(os.path.join(o.models, "model.json")) as f:
