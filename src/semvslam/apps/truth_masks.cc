@@ -32,13 +32,13 @@ class FolderTruth final : public TruthMaskSink {
     for (const Keypoint& k : whole_.keypoints) {
       const cv::Point2f pixel(k.x_px, k.y_px);
       if (is_masked(moving, pixel)) continue;
-      const bool dropped = is_masked(result.dynamic->left_out, pixel);
+      const bool dropped = result.dynamic->is_left_out(pixel);
       counts_.static_dropped.count(dropped);
       if (!is_masked(near_moving, pixel)) counts_.clear_static_dropped.count(dropped);
     }
     // Single points outside every mask and region are dropped too.
     for (const FeatureMark& mark : result.dynamic->features) {
-      if (is_masked(moving, mark.pixel) || is_masked(result.dynamic->left_out, mark.pixel)) continue;
+      if (is_masked(moving, mark.pixel) || result.dynamic->is_left_out(mark.pixel)) continue;
       if (mark.use != kNotUsed) {
         counts_.static_barred.count(mark.use == kKnownLandmarkOnly && !mark.tracked);
         continue;

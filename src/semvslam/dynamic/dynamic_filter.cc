@@ -249,7 +249,7 @@ const std::vector<std::uint8_t>& DynamicFilter::judge(std::span<const cv::Point2
   record.features.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) record.features[i].pixel = pixels[i];
   record.moving = s.excluded;
-  record.left_out = s.cores;
+  record.left_out = {s.cores};
   if (!s.motion) {
     s.doubt_outlines();
     return s.usable;
@@ -281,16 +281,10 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   if (regions_mask.empty() && instances_mask.empty()) return;
   // What was extracted with stays as it was; the record gets everything.
   record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
-  record->left_out = cores.empty() ? cv::Mat::zeros(size, CV_8UC1) : cores.clone();
-  for (cv::Mat* mask : {&regions_mask, &instances_mask}) {
-    if (mask->empty()) continue;
-    cv::Mat whole = mask->clone();
-    grow_mask(whole, options.dilate_px);
-    cv::bitwise_or(record->moving, whole, record->moving);
-    // An instance was seen as a whole before it moved: landmarks are on it.
-    if (mask == &regions_mask) *mask = without_rim(*mask, options.dilate_px);
-    cv::bitwise_or(record->left_out, *mask, record->left_out);
-  }
+  for (const cv::Mat* mask : {&regions_mask, &instances_mask}) add_grown(record->moving, *mask, options.dilate_px);
+  // Not of instances: each was seen as a whole before it moved, and landmarks are on it.
+  if (!regions_mask.empty()) regions_mask = without_rim(regions_mask, options.dilate_px);
+  record->left_out = {cores, regions_mask, instances_mask};
 }
 
 cv::Mat DynamicFilter::State::watched_parts(double time_s) const {
@@ -405,7 +399,7 @@ void DynamicFilter::State::open_if_needed(std::span<const float> depths_m) {
   // known.
   std::replace(usable.begin(), usable.end(), std::uint8_t{kNotUsed}, std::uint8_t{kKnownLandmarkOnly});
   record->moving = excluded;
-  record->left_out = cores;
+  record->left_out = {cores};
   record->fail_open = FailOpen::kMotion;
 }
 

@@ -114,7 +114,7 @@ TEST(DynamicFilter, MasksOfDynamicClassesAreExcludedWithAnOutlineOfDoubt) {
   const std::vector<std::uint8_t> usable = filter.judge(pixels, std::vector<float>(pixels.size(), 3.f));
   EXPECT_EQ(usable, (std::vector<std::uint8_t>{kKnownLandmarkOnly, kKnownLandmarkOnly, kFullyUsed, kFullyUsed}));
   EXPECT_EQ(filter.record()->features[0].reason, FeatureReason::kAtOutline);
-  EXPECT_EQ(cv::norm(filter.record()->left_out, core, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(filter.record()->left_out.at(0), core, cv::NORM_INF), 0);
   cv::Mat grown = cv::Mat::zeros(kHeight, kWidth, CV_8UC1);
   grown(cv::Rect(37, 37, 56, 36)).setTo(255);
   EXPECT_EQ(cv::norm(filter.record()->moving, grown, cv::NORM_INF), 0);

@@ -1,5 +1,9 @@
 #include "semvslam/dynamic/dynamic_record.h"
 
+#include <algorithm>
+
+#include "semvslam/geometry/mask_lookup.h"
+
 namespace semvslam {
 
 std::string_view to_string(FeatureVerdict verdict) {
@@ -58,6 +62,10 @@ std::string_view to_string(FailOpen fail_open) {
       break;
   }
   return "semantic";
+}
+
+bool DynamicRecord::is_left_out(const cv::Point2f& pixel) const {
+  return std::any_of(left_out.begin(), left_out.end(), [&](const cv::Mat& mask) { return is_masked(mask, pixel); });
 }
 
 }  // namespace semvslam

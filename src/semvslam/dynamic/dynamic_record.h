@@ -78,9 +78,11 @@ struct DynamicRecord {
   int moving_regions = 0;                           // moving things of no known class
   double masked_share = 0;                          // of the image's pixels, before features are extracted
   cv::Mat moving;                                   // CV_8UC1, 255 = pixel of something that moves or may; empty = none
-  cv::Mat left_out;  // the same without the outlines: the pixels that no feature is used of
+  /// Masks like `moving`, together the same without the outlines: the pixels that no feature is used of.
+  std::vector<cv::Mat> left_out;
   std::vector<FeatureMark> features;
 
+  bool is_left_out(const cv::Point2f& pixel) const;
   int count(FeatureVerdict v) const { return verdicts[static_cast<std::size_t>(v)]; }
 };
 

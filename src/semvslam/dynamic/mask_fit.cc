@@ -18,6 +18,16 @@ int next_set(const std::uint8_t* row, int from, int end) {
   return at != nullptr ? static_cast<int>(static_cast<const std::uint8_t*>(at) - row) : end;
 }
 
+cv::Mat square(int reach_px) { return cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px + 1, 2 * reach_px + 1}); }
+
+/// The part of the image within reach of a pixel that is set; empty where none is.
+cv::Rect reach_of(const cv::Mat& mask, int reach_px) {
+  const cv::Rect set = cv::boundingRect(mask);
+  if (set.empty()) return {};
+  const cv::Point reach(reach_px, reach_px);
+  return cv::Rect(set.tl() - reach, set.br() + reach) & cv::Rect(cv::Point(), mask.size());
+}
+
 }  // namespace
 
 void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, const MaskFitOptions& options) {
@@ -41,9 +51,8 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
   }
   // The thing's own depth comes from its core: the rim of a mask may lie on what is behind it.
   cv::Mat core, widest;
-  const cv::Mat element = cv::getStructuringElement(cv::MORPH_RECT, {2 * half_band + 1, 2 * half_band + 1});
-  cv::erode(thing, core, element);
-  cv::dilate(thing, widest, element);
+  cv::erode(thing, core, square(half_band));
+  cv::dilate(thing, widest, square(half_band));
   for (int y = 0; y < window.height; ++y) {
     const std::uint8_t* cores = core.ptr<std::uint8_t>(y);
     const float* depths = depth_m.ptr<float>(y);
@@ -75,18 +84,27 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
 
 void grow_mask(cv::Mat& mask, int reach_px) {
   if (reach_px <= 0) return;
-  const cv::Rect set = cv::boundingRect(mask);
+  const cv::Rect set = reach_of(mask, reach_px);
   if (set.empty()) return;
-  const int side = 2 * reach_px + 1;
-  cv::Mat part = mask(cv::Rect(set.x - reach_px, set.y - reach_px, set.width + side - 1, set.height + side - 1) &
-                      cv::Rect(cv::Point(), mask.size()));
-  cv::dilate(part, part, cv::getStructuringElement(cv::MORPH_RECT, {side, side}));
+  cv::Mat part = mask(set);
+  cv::dilate(part, part, square(reach_px));
+}
+
+void add_grown(cv::Mat& target, const cv::Mat& mask, int reach_px) {
+  const cv::Rect set = mask.empty() ? cv::Rect() : reach_of(mask, reach_px);
+  if (set.empty()) return;
+  cv::Mat grown, part = target(set);
+  cv::dilate(mask(set), grown, square(reach_px));
+  cv::bitwise_or(part, grown, part);
 }
 
 cv::Mat without_rim(const cv::Mat& mask, int rim_px) {
   if (rim_px <= 0) return mask.clone();
-  cv::Mat inside;
-  cv::erode(mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {2 * rim_px + 1, 2 * rim_px + 1}));
+  cv::Mat inside = cv::Mat::zeros(mask.size(), CV_8UC1);
+  const cv::Rect set = reach_of(mask, rim_px);
+  if (set.empty()) return inside;
+  cv::Mat part = inside(set);
+  cv::erode(mask(set), part, square(rim_px));
   return inside;
 }
 

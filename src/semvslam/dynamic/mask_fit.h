@@ -21,6 +21,9 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
 /// place; may be all zero.
 void grow_mask(cv::Mat& mask, int reach_px);
 
+/// Sets in `target` what grow_mask() would set in a copy of `mask`, which may be empty. Both CV_8UC1 of one size.
+void add_grown(cv::Mat& target, const cv::Mat& mask, int reach_px);
+
 /// The mask without its pixels that are at most `rim_px` rows and columns from one that is not set; beyond the image's
 /// border it goes on. @param mask CV_8UC1. @return a mask of its own.
 cv::Mat without_rim(const cv::Mat& mask, int rim_px);

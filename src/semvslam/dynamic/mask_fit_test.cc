@@ -69,6 +69,19 @@ TEST(GrowMask, ReachesAsFarAsSaidAndNotAcrossTheBorder) {
   EXPECT_EQ(cv::countNonZero(nothing), 0);
 }
 
+TEST(AddGrown, SetsWhatGrowingWouldSetAndKeepsTheRest) {
+  cv::Mat mask = cv::Mat::zeros(20, 30, CV_8UC1), target = mask.clone();
+  mask(cv::Rect(0, 5, 10, 10)).setTo(255);
+  target.at<std::uint8_t>(1, 29) = 255;
+  cv::Mat expected = mask.clone();
+  grow_mask(expected, 3);
+  expected.at<std::uint8_t>(1, 29) = 255;
+  add_grown(target, mask, 3);
+  EXPECT_EQ(cv::norm(target, expected, cv::NORM_INF), 0);
+  add_grown(target, cv::Mat(), 3);
+  EXPECT_EQ(cv::norm(target, expected, cv::NORM_INF), 0);
+}
+
 TEST(MaskWithoutRim, LosesItsRimButNotTheImagesBorder) {
   cv::Mat mask = cv::Mat::zeros(20, 30, CV_8UC1);
   mask(cv::Rect(0, 5, 10, 10)).setTo(255);
