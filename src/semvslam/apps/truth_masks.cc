@@ -36,7 +36,7 @@ class FolderTruth final : public TruthMaskSink {
       counts_.static_dropped.count(dropped);
       if (!is_masked(near_moving, pixel)) counts_.clear_static_dropped.count(dropped);
     }
-    // Single points outside every mask and region are dropped too.
+    // Single points outside what is left out as a whole are dropped too.
     for (const FeatureMark& mark : result.dynamic->features) {
       if (is_masked(moving, mark.pixel) || result.dynamic->is_left_out(mark.pixel)) continue;
       if (mark.use != kNotUsed) {

@@ -21,8 +21,7 @@ struct TruthCounts {
   Share kept_on_moving;      // of the features that are used: a landmark may come from them or was found at them
   Share tracked_on_moving;   // of those that a landmark was found at: the ones that the pose comes from
   Share static_dropped;      // of the whole image's features on the static scene, those that tracking may not use
-  /// The same of those whose surroundings are static too: a descriptor at an outline sees both sides, and the policy
-  /// drops it by intention.
+  /// The same of those whose surroundings are static too: a descriptor at an outline sees both sides.
   Share clear_static_dropped;
   /// Of the features on the static scene that are not dropped: those that no landmark was found at and may come from.
   Share static_barred;
