@@ -18,41 +18,35 @@ bool passes_ratio(int best, int rival, float ratio) {
   return rival == kNoDistance || static_cast<float>(best) <= ratio * static_cast<float>(rival);
 }
 
-/// The best feature for one query; feature = -1 when none passes.
-class BestMatch {
- public:
-  BestMatch(const ProjectedQuery& query, const OrbFeatures& features) : query_(query), features_(features) {}
-
-  void offer(std::uint32_t index) {
-    const Keypoint& keypoint = features_.keypoints[index];
-    if (keypoint.level < query_.min_level || keypoint.level > query_.max_level) return;
-    const int distance = hamming_distance(query_.descriptor, features_.descriptors[index]);
-    if (distance < best_ || (distance == best_ && static_cast<int>(index) < feature_)) {
-      best_ = distance;
-      feature_ = static_cast<int>(index);
-    }
-  }
-
-  /// Second pass, after every candidate was offered: who is a rival depends on which one is the best.
-  void offer_rival(std::uint32_t index) {
-    if (static_cast<int>(index) == feature_) return;
-    const Keypoint& k = features_.keypoints[index];
-    if (k.level < query_.min_level || k.level > query_.max_level) return;
-    const Keypoint& b = features_.keypoints[static_cast<std::size_t>(feature_)];
-    const bool twin =
-        k.level != b.level && std::abs(k.x_px - b.x_px) <= kSamePlacePx && std::abs(k.y_px - b.y_px) <= kSamePlacePx;
-    if (!twin) rival_ = std::min(rival_, hamming_distance(query_.descriptor, features_.descriptors[index]));
-  }
-
-  int feature() const { return feature_; }
-  int distance() const { return best_; }
-  int rival() const { return rival_; }
-
- private:
-  const ProjectedQuery& query_;
-  const OrbFeatures& features_;
-  int feature_ = -1, best_ = kNoDistance, rival_ = kNoDistance;
+struct Candidate {
+  std::uint32_t feature;
+  int distance;
 };
+
+/// The features in the query's square and level range, each with its distance.
+void collect_candidates(const ProjectedQuery& query, const OrbFeatures& features, const ImageGrid& grid,
+                        std::vector<Candidate>& out) {
+  out.clear();
+  grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) {
+    const int level = features.keypoints[i].level;
+    if (level < query.min_level || level > query.max_level) return;
+    out.push_back({i, hamming_distance(query.descriptor, features.descriptors[i])});
+  });
+}
+
+bool is_same_place(const Keypoint& a, const Keypoint& b) {
+  return a.level != b.level && std::abs(a.x_px - b.x_px) <= kSamePlacePx && std::abs(a.y_px - b.y_px) <= kSamePlacePx;
+}
+
+/// Whether another place of the image looks nearly as good as the best one.
+bool has_rival(const Candidate& best, const std::vector<Candidate>& candidates, const OrbFeatures& features,
+               float ratio) {
+  const Keypoint& place = features.keypoints[best.feature];
+  return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
+    return c.feature != best.feature && !passes_ratio(best.distance, c.distance, ratio) &&
+           !is_same_place(place, features.keypoints[c.feature]);
+  });
+}
 
 /// Change of angle from query to feature in [0, 2 pi).
 float angle_change_rad(const ProjectedQuery& query, const Keypoint& keypoint) {
@@ -155,16 +149,17 @@ class WordColumns {
 void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures& features, const ImageGrid& grid,
                      const MatchOptions& options, std::vector<Match>& out) {
   out.clear();
+  std::vector<Candidate> candidates;
   for (std::size_t q = 0; q < queries.size(); ++q) {
     const ProjectedQuery& query = queries[q];
-    BestMatch best(query, features);
-    grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) { best.offer(i); });
-    if (best.feature() < 0 || best.distance() > options.max_distance) continue;
-    if (options.ratio < 1.f) {
-      grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) { best.offer_rival(i); });
-      if (!passes_ratio(best.distance(), best.rival(), options.ratio)) continue;
-    }
-    out.push_back({static_cast<int>(q), best.feature(), best.distance()});
+    collect_candidates(query, features, grid, candidates);
+    const auto best =
+        std::min_element(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+          return a.distance != b.distance ? a.distance < b.distance : a.feature < b.feature;
+        });
+    if (best == candidates.end() || best->distance > options.max_distance) continue;
+    if (options.ratio < 1.f && has_rival(*best, candidates, features, options.ratio)) continue;
+    out.push_back({static_cast<int>(q), static_cast<int>(best->feature), best->distance});
   }
   if (options.check_rotation) drop_odd_rotations(queries, features, out);
   make_one_to_one(features.size(), out);
