@@ -90,6 +90,11 @@ Status ImageDecoder::check_size(cv::Size size) const {
                                                      expected_.width, expected_.height)};
 }
 
+void ImageDecoder::take_images(cv::Mat& gray, cv::Mat* colour) {
+  gray = images_.take(expected_, CV_8UC1);
+  if (colour) *colour = images_.take(expected_, CV_8UC3);
+}
+
 Result<std::optional<PngPixels>> ImageDecoder::decode_png(ByteSpan file) {
   if (!is_png(file)) return std::optional<PngPixels>();
   const Result<PngHeader> header = read_png_header(file);
@@ -123,6 +128,7 @@ Status ImageDecoder::colour_image(ByteSpan file, cv::Mat& gray, cv::Mat* colour)
     const Result<cv::Size> size = jpeg_.size(file);
     if (size) {
       if (Status s = check_size(*size); !s) return s;
+      take_images(gray, colour);
       return jpeg_.decode(file, gray, colour);
     }
     if (size.error().code != ErrorCode::kUnsupported) return size.error();
@@ -131,6 +137,7 @@ Status ImageDecoder::colour_image(ByteSpan file, cv::Mat& gray, cv::Mat* colour)
   if (!png) return png.error();
   if (png->has_value() && (*png)->header.colour != PngColour::kPalette) {
     if ((*png)->header.bits != 8) return wrong_kind(kWantColour, type_of(**png));
+    take_images(gray, colour);
     return split_colour(view_of(**png), true, gray, colour);
   }
   cv::Mat image;
@@ -144,6 +151,7 @@ Status ImageDecoder::depth_image(ByteSpan file, cv::Mat& depth) {
   if (!png) return png.error();
   if (png->has_value()) {
     if ((*png)->header.bits != 16) return wrong_kind(kWantDepth, type_of(**png));
+    depth = images_.take(expected_, CV_16UC1);
     copy_big_endian_16(**png, depth);
     return Status::success();
   }
@@ -160,6 +168,7 @@ Status ImageDecoder::label_image(ByteSpan file, cv::Mat& labels) {
   if (!png) return png.error();
   if (png->has_value()) {
     if (type_of(**png) != CV_8UC1) return wrong_kind(kWantLabels, type_of(**png));
+    labels = images_.take(expected_, CV_8UC1);
     view_of(**png).copyTo(labels);
     return Status::success();
   }

@@ -6,6 +6,7 @@
 #include "semvslam/base/result.h"
 #include "semvslam/data/jpeg_decode.h"
 #include "semvslam/data/png_decode.h"
+#include "semvslam/geometry/image_pool.h"
 
 namespace semvslam {
 
@@ -13,8 +14,8 @@ namespace semvslam {
 /// else (interlaced PNG, TIFF, WebP, PGM...) by OpenCV. Keeps scratch memory between images: one decoder per thread.
 /// All calls: errors say what is wrong with the image in a few words, without its name (the caller knows it): truncated
 /// or corrupt data, a size other than `expected`, the wrong number of bits or channels. Sizes are checked before
-/// anything is decoded, so a PNG or JPEG of some bytes cannot claim gigabytes. The results are new images, never shared
-/// with the decoder.
+/// anything is decoded, so a PNG or JPEG of some bytes cannot claim gigabytes. The results are images of their own: the
+/// decoder writes into one again only when nobody else holds it any more.
 class ImageDecoder {
  public:
   explicit ImageDecoder(cv::Size expected) : expected_(expected) {}
@@ -30,6 +31,8 @@ class ImageDecoder {
 
  private:
   Status check_size(cv::Size size) const;
+  /// Images of the expected size, for the decoding to write into. @param colour may be null.
+  void take_images(cv::Mat& gray, cv::Mat* colour);
   /// The pixels of a PNG that our decoder reads; nothing when OpenCV has to do it.
   Result<std::optional<PngPixels>> decode_png(ByteSpan file);
   /// By OpenCV; any format, any type.
@@ -37,6 +40,7 @@ class ImageDecoder {
   cv::Size expected_;
   PngDecoder png_;
   JpegDecoder jpeg_;
+  ImagePool images_;
 };
 
 }  // namespace semvslam

@@ -7,6 +7,7 @@
 #include "semvslam/dynamic/instance_rest.h"
 #include "semvslam/dynamic/mover_reach.h"
 #include "semvslam/geometry/depth_image.h"
+#include "semvslam/geometry/image_pool.h"
 #include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {
@@ -49,13 +50,16 @@ struct DynamicFilter::State {
   cv::Point expected_shift_px(const MovingRegion& region) const;
   void add_moving_things(double time_s);
   bool masks(std::size_t instance) const;
-  cv::Mat watched_parts(double time_s) const;
+  cv::Mat watched_parts(double time_s);
+  std::optional<std::vector<std::uint16_t>> instances_of_tracks() const;
   void find_moving_instances(double time_s);
   void mark_features();
   void doubt_outlines();
   void doubt_near_movers();
   void open_if_needed(std::span<const float> depths_m);
-  void paint(cv::Mat& target, const Instance& instance, bool whole_box) const;
+  void paint(cv::Mat& target, const Instance& instance, bool whole_box);
+  cv::Mat copy(const cv::Mat& mask);
+  cv::Mat inside(const cv::Mat& mask);
 
   const Camera camera;
   const DynamicOptions options;
@@ -91,7 +95,8 @@ struct DynamicFilter::State {
                         [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
   }
   std::vector<PointVerdict> verdicts;  // scratch
-  SideTask following;                  // of the point tracks into the present frame; last, so that it ends first
+  ImagePool masks_pool;
+  SideTask following;  // of the point tracks into the present frame; last, so that it ends first
 };
 
 DynamicFilter::DynamicFilter(const Camera& camera, const DynamicOptions& options)
@@ -145,8 +150,8 @@ void DynamicFilter::State::use_segmentation(const Segmentation* given) {
 }
 
 /// @param target made, all zero, where it is empty.
-void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool whole_box) const {
-  if (target.empty()) target = cv::Mat::zeros(size, CV_8UC1);
+void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool whole_box) {
+  if (target.empty()) target = masks_pool.take_zeros(size, CV_8UC1);
   const cv::Rect all(cv::Point(), size);
   if (whole_box) {
     const cv::Rect box(cv::Point(cvFloor(instance.box.x), cvFloor(instance.box.y)),
@@ -156,6 +161,21 @@ void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool
   }
   const cv::Rect window = instance.window & all;
   if (window == instance.window && !window.empty()) target(window).setTo(255, instance.mask);
+}
+
+/// Of a mask that may be empty: then all zero.
+cv::Mat DynamicFilter::State::copy(const cv::Mat& mask) {
+  if (mask.empty()) return masks_pool.take_zeros(size, CV_8UC1);
+  cv::Mat out = masks_pool.take(size, CV_8UC1);
+  mask.copyTo(out);
+  return out;
+}
+
+cv::Mat DynamicFilter::State::inside(const cv::Mat& mask) {
+  if (mask.empty()) return {};
+  cv::Mat out = masks_pool.take(size, CV_8UC1);
+  without_rim(mask, options.dilate_px, out);
+  return out;
 }
 
 /// Whether an instance is left out for what it is, not for what it does.
@@ -172,11 +192,11 @@ void DynamicFilter::State::compose_mask() {
     paint(excluded, segmentation.instances[i], boxes);
   }
   if (!excluded.empty() && !boxes) fit_to_depth(excluded, frame.depth, metres_per_unit, options.fit);
-  cores = excluded.empty() ? cv::Mat() : without_rim(excluded, options.dilate_px);
+  cores = inside(excluded);
   if (!frame.mask.empty()) {  // its outline is the caller's word
     if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
     for (cv::Mat* mask : {&cores, &excluded}) {
-      if (mask->empty()) *mask = cv::Mat::zeros(size, CV_8UC1);
+      if (mask->empty()) *mask = masks_pool.take_zeros(size, CV_8UC1);
       mask->setTo(255, frame.mask);
     }
   }
@@ -184,10 +204,12 @@ void DynamicFilter::State::compose_mask() {
   record->masked_share = excluded.empty() ? 0 : static_cast<double>(cv::countNonZero(excluded)) / size.area();
   avoided = cores;
   if (expected_movers.empty() || !movers_avoided) return;
-  if (cores.empty())
+  if (cores.empty()) {
     avoided = expected_movers;
-  else
-    cv::bitwise_or(cores, expected_movers, avoided = cv::Mat());
+    return;
+  }
+  avoided = masks_pool.take(size, CV_8UC1);
+  cv::bitwise_or(cores, expected_movers, avoided);
 }
 
 /// Features on what motion has found would be thrown away; the static scene shall have them. Where a mover is expected
@@ -202,7 +224,7 @@ void DynamicFilter::State::expect_movers() {
     if (visible.empty() || mask.size() != window.size()) return;
     cv::Mat inside;
     cv::erode(mask, inside, element, {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
-    if (expected_movers.empty()) expected_movers = cv::Mat::zeros(size, CV_8UC1);
+    if (expected_movers.empty()) expected_movers = masks_pool.take_zeros(size, CV_8UC1);
     expected_movers(visible).setTo(255, inside(visible - window.tl()));
   };
   for (const MovingRegion& region : motion_result.regions)
@@ -280,38 +302,55 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   find_moving_instances(time_s);
   if (regions_mask.empty() && instances_mask.empty()) return;
   // What was extracted with stays as it was; the record gets everything.
-  record->moving = excluded.empty() ? cv::Mat::zeros(size, CV_8UC1) : excluded.clone();
+  record->moving = copy(excluded);
   for (const cv::Mat* mask : {&regions_mask, &instances_mask}) add_grown(record->moving, *mask, options.dilate_px);
   // Not of instances: each was seen as a whole before it moved, and landmarks are on it.
-  if (!regions_mask.empty()) regions_mask = without_rim(regions_mask, options.dilate_px);
+  regions_mask = inside(regions_mask);
   record->left_out = {cores, regions_mask, instances_mask};
 }
 
-cv::Mat DynamicFilter::State::watched_parts(double time_s) const {
+cv::Mat DynamicFilter::State::watched_parts(double time_s) {
   cv::Mat watched = movers_avoided ? expected_movers : cv::Mat();
   bool own = false;  // not yet: the filter's mask may only be read
   for (std::size_t i = 0; i < masked_instances; ++i) {
     if (!masks(i) || !rest.is_worth_watching(segmentation.instances[i], time_s)) continue;
-    if (!own) watched = watched.clone();
+    if (!own) watched = copy(watched);
     own = true;
     paint(watched, segmentation.instances[i], false);
   }
   return watched;
 }
 
-void DynamicFilter::State::find_moving_instances(double time_s) {
-  cv::Mat labels;
-  for (std::size_t i = 0; i < segmentation.instances.size(); ++i) {
+/// Per track: which instance it lies in that may move, counted from 1; 0 = none. Nothing where no instance may.
+std::optional<std::vector<std::uint16_t>> DynamicFilter::State::instances_of_tracks() const {
+  std::vector<std::size_t> asked;
+  for (std::size_t i = segmentation.instances.size(); i-- > 0;) {  // of those that overlap the last counts
     const Instance& instance = segmentation.instances[i];
-    const bool asked = instance.role == Role::kMovable || (instance.role == Role::kDynamic && options.rest_after_s > 0);
-    if (!asked || instance.mask.empty()) continue;
-    if (labels.empty()) labels = cv::Mat::zeros(size, CV_16UC1);
-    labels(instance.window).setTo(static_cast<double>(i + 1), instance.mask);
+    const bool may = instance.role == Role::kMovable || (instance.role == Role::kDynamic && options.rest_after_s > 0);
+    if (may && !instance.mask.empty()) asked.push_back(i);
   }
+  if (asked.empty()) return std::nullopt;
+  const auto covers = [&](std::size_t i, cv::Point at) {
+    const Instance& instance = segmentation.instances[i];
+    return instance.window.contains(at) && instance.mask.at<std::uint8_t>(at - instance.window.tl()) != 0;
+  };
+  std::vector<std::uint16_t> out(motion->tracks().size(), 0);
+  for (std::size_t t = 0; t < out.size(); ++t) {
+    const Eigen::Vector2f& pixel = motion->tracks()[t].newest().pixel;
+    const cv::Point at(std::clamp(cvRound(pixel.x()), 0, size.width - 1),
+                       std::clamp(cvRound(pixel.y()), 0, size.height - 1));
+    const auto top = std::find_if(asked.begin(), asked.end(), [&](std::size_t i) { return covers(i, at); });
+    if (top != asked.end()) out[t] = static_cast<std::uint16_t>(*top + 1);
+  }
+  return out;
+}
+
+void DynamicFilter::State::find_moving_instances(double time_s) {
   std::erase_if(moved, [&](const MovableMemory& m) { return time_s - m.moved_at_s > options.movable_hold_s; });
-  if (labels.empty()) return;
+  const std::optional<std::vector<std::uint16_t>> instances = instances_of_tracks();
+  if (!instances) return;
   const std::vector<InstanceMotion> motions =
-      count_instance_motion(motion->tracks(), motion_result.check.tracks, labels, segmentation.instances.size());
+      count_instance_motion(motion_result.check.tracks, *instances, segmentation.instances.size());
   std::vector<std::uint8_t> rested(motions.size(), 0);
   for (std::size_t i = 0; i < motions.size(); ++i) rested[i] = rest.rests(segmentation.instances[i]);
   rest.update(segmentation.instances, motions, time_s);

@@ -98,14 +98,16 @@ void add_grown(cv::Mat& target, const cv::Mat& mask, int reach_px) {
   cv::bitwise_or(part, grown, part);
 }
 
-cv::Mat without_rim(const cv::Mat& mask, int rim_px) {
-  if (rim_px <= 0) return mask.clone();
-  cv::Mat inside = cv::Mat::zeros(mask.size(), CV_8UC1);
+void without_rim(const cv::Mat& mask, int rim_px, cv::Mat& inside) {
+  if (rim_px <= 0) {
+    mask.copyTo(inside);
+    return;
+  }
+  inside.setTo(0);
   const cv::Rect set = reach_of(mask, rim_px);
-  if (set.empty()) return inside;
+  if (set.empty()) return;
   cv::Mat part = inside(set);
   cv::erode(mask(set), part, square(rim_px));
-  return inside;
 }
 
 }  // namespace semvslam

@@ -25,7 +25,7 @@ void grow_mask(cv::Mat& mask, int reach_px);
 void add_grown(cv::Mat& target, const cv::Mat& mask, int reach_px);
 
 /// The mask without its pixels that are at most `rim_px` rows and columns from one that is not set; beyond the image's
-/// border it goes on. @param mask CV_8UC1. @return a mask of its own.
-cv::Mat without_rim(const cv::Mat& mask, int rim_px);
+/// border it goes on. @param mask CV_8UC1. @param inside gets it; CV_8UC1 of the mask's size, must not be the mask.
+void without_rim(const cv::Mat& mask, int rim_px, cv::Mat& inside);
 
 }  // namespace semvslam

@@ -338,7 +338,7 @@ void MovingRegions::merge() {
 
 void MovingRegions::draw() {
   regions_.clear();
-  mask_ = cv::Mat::zeros(camera_.height_px, camera_.width_px, CV_8UC1);  // anew: results given out share the old one
+  mask_ = masks_.take_zeros({camera_.width_px, camera_.height_px}, CV_8UC1);  // results given out share the old one
   for (Kept& kept : kept_) {
     const cv::Rect cells = cv::boundingRect(kept.cells);
     if (cells.empty()) continue;
@@ -376,19 +376,14 @@ void MovingRegions::step(const MotionFrame& frame, std::span<const FlowTrack> tr
   last_time_s_ = frame.time_s;
 }
 
-std::vector<InstanceMotion> count_instance_motion(std::span<const FlowTrack> tracks,
-                                                  std::span<const TrackMotion> motion, const cv::Mat& instances,
-                                                  std::size_t count) {
-  if (tracks.size() != motion.size()) throw std::invalid_argument("instance motion: one verdict per track is needed");
+std::vector<InstanceMotion> count_instance_motion(std::span<const TrackMotion> motion,
+                                                  std::span<const std::uint16_t> instances, std::size_t count) {
+  if (instances.size() != motion.size())
+    throw std::invalid_argument("instance motion: one verdict per track is needed");
   std::vector<InstanceMotion> counts(count);
   for (std::size_t i = 0; i < count; ++i) counts[i].instance = InstanceId(static_cast<std::uint32_t>(i));
-  if (instances.empty()) return counts;
-  if (instances.type() != CV_16UC1) throw std::invalid_argument("instance motion: labels must be CV_16UC1");
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    const Eigen::Vector2f& pixel = tracks[i].newest().pixel;
-    const int x = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, instances.cols - 1);
-    const int y = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, instances.rows - 1);
-    const std::size_t label = instances.at<std::uint16_t>(y, x);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const std::size_t label = instances[i];
     if (label == 0 || label > count) continue;
     InstanceMotion& target = counts[label - 1];
     target.moving += motion[i].verdict == MotionVerdict::kMoving;

@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "semvslam/geometry/image_pool.h"
 #include "semvslam/motion/depth_seeds.h"
 #include "semvslam/motion/motion_check.h"
 #include "semvslam/motion/region_growth.h"
@@ -100,6 +101,7 @@ class MovingRegions {
   std::vector<Kept> kept_;
   std::vector<MovingRegion> regions_;
   cv::Mat mask_;
+  ImagePool masks_;
 };
 
 /// How the tracks inside one instance fare.
@@ -110,10 +112,9 @@ struct InstanceMotion {
   double moving_share() const { return moving + at_rest > 0 ? static_cast<double>(moving) / (moving + at_rest) : 0; }
 };
 
-/// @param instances CV_16UC1 of the frame's size, 0 = none, n = instance n - 1. Entry i is instance i; as many as
+/// @param instances one per track: where it lies, 0 = in none, n = in instance n - 1. Entry i is instance i; as many as
 /// asked.
-std::vector<InstanceMotion> count_instance_motion(std::span<const FlowTrack> tracks,
-                                                  std::span<const TrackMotion> motion, const cv::Mat& instances,
-                                                  std::size_t count);
+std::vector<InstanceMotion> count_instance_motion(std::span<const TrackMotion> motion,
+                                                  std::span<const std::uint16_t> instances, std::size_t count);
 
 }  // namespace semvslam

@@ -218,25 +218,20 @@ TEST(DepthSeeds, AreNotMadeByTheCamera) {
 }
 
 TEST(InstanceMotion, CountsVerdictsPerInstance) {
-  cv::Mat labels = cv::Mat::zeros(480, 640, CV_16UC1);
-  labels.colRange(0, 200).setTo(1);
-  labels.colRange(200, 400).setTo(2);
-  std::vector<FlowTrack> tracks;
+  std::vector<std::uint16_t> instances;
   std::vector<TrackMotion> motion;
-  const auto add = [&](float x, MotionVerdict verdict) {
-    TrackSample sample;
-    sample.pixel = {x, 100};
-    tracks.emplace_back(PointTrackId(static_cast<std::uint32_t>(tracks.size())));
-    tracks.back().push(sample);
+  const auto add = [&](std::uint16_t instance, MotionVerdict verdict) {
+    instances.push_back(instance);
     motion.push_back({});
     motion.back().verdict = verdict;
   };
-  for (int i = 0; i < 3; ++i) add(50, MotionVerdict::kMoving);
-  add(60, MotionVerdict::kStatic);
-  add(70, MotionVerdict::kUnknown);
-  add(300, MotionVerdict::kStatic);
-  add(500, MotionVerdict::kMoving);
-  const std::vector<InstanceMotion> counts = count_instance_motion(tracks, motion, labels, 3);
+  for (int i = 0; i < 3; ++i) add(1, MotionVerdict::kMoving);
+  add(1, MotionVerdict::kStatic);
+  add(1, MotionVerdict::kUnknown);
+  add(2, MotionVerdict::kStatic);
+  add(0, MotionVerdict::kMoving);
+  add(9, MotionVerdict::kMoving);  // more than are asked for
+  const std::vector<InstanceMotion> counts = count_instance_motion(motion, instances, 3);
   ASSERT_EQ(counts.size(), 3u);
   EXPECT_EQ(counts[0].moving, 3);
   EXPECT_EQ(counts[0].at_rest, 1);
@@ -244,7 +239,7 @@ TEST(InstanceMotion, CountsVerdictsPerInstance) {
   EXPECT_DOUBLE_EQ(counts[0].moving_share(), 0.75);
   EXPECT_EQ(counts[1].at_rest, 1);
   EXPECT_DOUBLE_EQ(counts[2].moving_share(), 0);
-  EXPECT_THROW(count_instance_motion(tracks, {}, labels, 3), std::invalid_argument);
+  EXPECT_THROW(count_instance_motion(motion, {}, 3), std::invalid_argument);
 }
 
 }  // namespace

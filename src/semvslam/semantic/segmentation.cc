@@ -3,12 +3,13 @@
 namespace semvslam {
 namespace {
 
+/// @param view of the image, to be drawn; must hold all that is wanted.
 template <typename Wanted>
-cv::Mat united(const Segmentation& s, Wanted wanted) {
-  cv::Mat out = cv::Mat::zeros(s.size, CV_8UC1);
+cv::Mat united(const Segmentation& s, const cv::Rect& view, Wanted wanted) {
+  cv::Mat out = cv::Mat::zeros(view.size(), CV_8UC1);
   for (const Instance& i : s.instances)
     if (wanted(i)) {
-      cv::Mat part = out(i.window);
+      cv::Mat part = out(i.window - view.tl());
       cv::bitwise_or(part, i.mask, part);
     }
   return out;
@@ -17,11 +18,11 @@ cv::Mat united(const Segmentation& s, Wanted wanted) {
 }  // namespace
 
 cv::Mat Segmentation::mask_of(Role least) const {
-  return united(*this, [&](const Instance& i) { return i.role >= least; });
+  return united(*this, {{}, size}, [&](const Instance& i) { return i.role >= least; });
 }
 
 cv::Mat Segmentation::mask_of_class(std::string_view class_name) const {
-  return united(*this, [&](const Instance& i) { return i.class_name == class_name; });
+  return united(*this, {{}, size}, [&](const Instance& i) { return i.class_name == class_name; });
 }
 
 cv::Mat Segmentation::labels() const {
@@ -32,7 +33,11 @@ cv::Mat Segmentation::labels() const {
 }
 
 int Segmentation::pixels_of_class(std::string_view class_name) const {
-  return cv::countNonZero(mask_of_class(class_name));
+  const auto wanted = [&](const Instance& i) { return i.class_name == class_name; };
+  cv::Rect view;
+  for (const Instance& i : instances)
+    if (wanted(i)) view |= i.window;
+  return view.empty() ? 0 : cv::countNonZero(united(*this, view, wanted));
 }
 
 }  // namespace semvslam
