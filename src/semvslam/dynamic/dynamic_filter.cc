@@ -59,7 +59,7 @@ struct DynamicFilter::State {
   void open_if_needed(std::span<const float> depths_m);
   void paint(cv::Mat& target, const Instance& instance, bool whole_box);
   cv::Mat copy(const cv::Mat& mask);
-  cv::Mat inside(const cv::Mat& mask);
+  cv::Mat core_of(const cv::Mat& mask);
 
   const Camera camera;
   const DynamicOptions options;
@@ -95,7 +95,7 @@ struct DynamicFilter::State {
                         [&](const MovableMemory& m) { return is_same_place(m.window, instance.window); });
   }
   std::vector<PointVerdict> verdicts;  // scratch
-  ImagePool masks_pool;
+  ImagePool mask_pool;
   SideTask following;  // of the point tracks into the present frame; last, so that it ends first
 };
 
@@ -151,7 +151,7 @@ void DynamicFilter::State::use_segmentation(const Segmentation* given) {
 
 /// @param target made, all zero, where it is empty.
 void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool whole_box) {
-  if (target.empty()) target = masks_pool.take_zeros(size, CV_8UC1);
+  if (target.empty()) target = mask_pool.take_zeros(size, CV_8UC1);
   const cv::Rect all(cv::Point(), size);
   if (whole_box) {
     const cv::Rect box(cv::Point(cvFloor(instance.box.x), cvFloor(instance.box.y)),
@@ -165,15 +165,16 @@ void DynamicFilter::State::paint(cv::Mat& target, const Instance& instance, bool
 
 /// Of a mask that may be empty: then all zero.
 cv::Mat DynamicFilter::State::copy(const cv::Mat& mask) {
-  if (mask.empty()) return masks_pool.take_zeros(size, CV_8UC1);
-  cv::Mat out = masks_pool.take(size, CV_8UC1);
+  if (mask.empty()) return mask_pool.take_zeros(size, CV_8UC1);
+  cv::Mat out = mask_pool.take(size, CV_8UC1);
   mask.copyTo(out);
   return out;
 }
 
-cv::Mat DynamicFilter::State::inside(const cv::Mat& mask) {
+/// Of a mask that may be empty: without its outline.
+cv::Mat DynamicFilter::State::core_of(const cv::Mat& mask) {
   if (mask.empty()) return {};
-  cv::Mat out = masks_pool.take(size, CV_8UC1);
+  cv::Mat out = mask_pool.take(size, CV_8UC1);
   without_rim(mask, options.dilate_px, out);
   return out;
 }
@@ -192,11 +193,11 @@ void DynamicFilter::State::compose_mask() {
     paint(excluded, segmentation.instances[i], boxes);
   }
   if (!excluded.empty() && !boxes) fit_to_depth(excluded, frame.depth, metres_per_unit, options.fit);
-  cores = inside(excluded);
+  cores = core_of(excluded);
   if (!frame.mask.empty()) {  // its outline is the caller's word
     if (record->mask_source == MaskSource::kNone) record->mask_source = MaskSource::kGiven;
     for (cv::Mat* mask : {&cores, &excluded}) {
-      if (mask->empty()) *mask = masks_pool.take_zeros(size, CV_8UC1);
+      if (mask->empty()) *mask = mask_pool.take_zeros(size, CV_8UC1);
       mask->setTo(255, frame.mask);
     }
   }
@@ -208,7 +209,7 @@ void DynamicFilter::State::compose_mask() {
     avoided = expected_movers;
     return;
   }
-  avoided = masks_pool.take(size, CV_8UC1);
+  avoided = mask_pool.take(size, CV_8UC1);
   cv::bitwise_or(cores, expected_movers, avoided);
 }
 
@@ -224,7 +225,7 @@ void DynamicFilter::State::expect_movers() {
     if (visible.empty() || mask.size() != window.size()) return;
     cv::Mat inside;
     cv::erode(mask, inside, element, {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
-    if (expected_movers.empty()) expected_movers = masks_pool.take_zeros(size, CV_8UC1);
+    if (expected_movers.empty()) expected_movers = mask_pool.take_zeros(size, CV_8UC1);
     expected_movers(visible).setTo(255, inside(visible - window.tl()));
   };
   for (const MovingRegion& region : motion_result.regions)
@@ -305,7 +306,7 @@ void DynamicFilter::State::add_moving_things(double time_s) {
   record->moving = copy(excluded);
   for (const cv::Mat* mask : {&regions_mask, &instances_mask}) add_grown(record->moving, *mask, options.dilate_px);
   // Not of instances: each was seen as a whole before it moved, and landmarks are on it.
-  regions_mask = inside(regions_mask);
+  regions_mask = core_of(regions_mask);
   record->left_out = {cores, regions_mask, instances_mask};
 }
 
@@ -337,8 +338,7 @@ std::optional<std::vector<std::uint16_t>> DynamicFilter::State::instances_of_tra
   std::vector<std::uint16_t> out(motion->tracks().size(), 0);
   for (std::size_t t = 0; t < out.size(); ++t) {
     const Eigen::Vector2f& pixel = motion->tracks()[t].newest().pixel;
-    const cv::Point at(std::clamp(cvRound(pixel.x()), 0, size.width - 1),
-                       std::clamp(cvRound(pixel.y()), 0, size.height - 1));
+    const cv::Point at = nearest_pixel(size, {pixel.x(), pixel.y()});
     const auto top = std::find_if(asked.begin(), asked.end(), [&](std::size_t i) { return covers(i, at); });
     if (top != asked.end()) out[t] = static_cast<std::uint16_t>(*top + 1);
   }
