@@ -13,7 +13,7 @@ void add_segmenter_options(CLI::App& parser, SegmenterOptions& options) {
   parser.add_option("--backend", options.backend, "auto, openvino or opencv")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "openvino", "opencv"}));
-  parser.add_option("--precision", options.precision, "auto, f32 or int8")
+  parser.add_option("--precision", options.precision, "auto (floats, of 16 bits where those are fast), f32 or int8")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "f32", "int8"}));
   parser

@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "semvslam/semantic/json_integer.h"
+
 namespace semvslam {
 namespace {
 
@@ -113,7 +115,7 @@ CocoRegion CocoRegion::parse(const nlohmann::json& json) {
       if (auto polygon = parse_polygon(p); polygon.size() >= 6) out.polygons.push_back(std::move(polygon));
   } else {
     const nlohmann::json& counts = json.at("counts");
-    out.runs = counts.is_string() ? unpack_runs(counts.get<std::string>()) : counts.get<std::vector<std::uint32_t>>();
+    out.runs = counts.is_string() ? unpack_runs(counts.get<std::string>()) : integers_at<std::uint32_t>(json, "counts");
   }
   return out;
 }

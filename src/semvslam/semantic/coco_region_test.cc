@@ -37,7 +37,8 @@ TEST(CocoRegion, PackingAndParsingAreInverse) {
 }
 
 TEST(CocoRegion, WhatIsNoRegionThrowsAndWhatIsTooLongIsCut) {
-  for (const char* text : {"5", "{}", "{\"counts\": 3}", "[[1, 2, \"a\", 4, 5, 6]]", "[[0, 0, 1e300, 0, 5, 5]]"})
+  for (const char* text : {"5", "{}", "{\"counts\": 3}", "[[1, 2, \"a\", 4, 5, 6]]", "[[0, 0, 1e300, 0, 5, 5]]",
+                           "{\"counts\": [1e20]}", "{\"counts\": [3, -1]}", "{\"counts\": [3, 0.5]}"})
     EXPECT_THROW(CocoRegion::parse(json::parse(text)), std::exception) << text;
   const json beyond{{"counts", {3, 1000000}}};
   EXPECT_EQ(cv::countNonZero(CocoRegion::parse(beyond).mask({4, 5})), 17);

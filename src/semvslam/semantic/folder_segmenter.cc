@@ -15,6 +15,7 @@
 #include "semvslam/data/file_io.h"
 #include "semvslam/semantic/coco_region.h"
 #include "semvslam/semantic/json_fault.h"
+#include "semvslam/semantic/json_integer.h"
 
 namespace semvslam {
 namespace fs = std::filesystem;
@@ -83,8 +84,8 @@ Status FolderSegmenter::read_roles() {
     try {
       const nlohmann::json listed = nlohmann::json::parse(stream);
       for (const nlohmann::json& role : listed)
-        class_of_number_[role.at("number").get<int>()] = class_of(role.at("label").get<std::string>());
-    } catch (const nlohmann::json::exception& e) {
+        class_of_number_[integer_at<int>(role, "number")] = class_of(role.at("label").get<std::string>());
+    } catch (const std::exception& e) {
       return wrong_file(file, json_fault(e));
     }
     break;
@@ -171,7 +172,7 @@ Status FolderSegmenter::read_json(const fs::path& file, Segmentation& out) {
   if (!text) return text.error();
   try {
     const nlohmann::json root = nlohmann::json::parse(*text);
-    const cv::Size size(root.at("width").get<int>(), root.at("height").get<int>());
+    const cv::Size size(integer_at<int>(root, "width"), integer_at<int>(root, "height"));
     if (size != out.size) return wrong_file(file, differs(size, out.size));
     for (const nlohmann::json& found : root.at("instances")) {
       const cv::Mat whole = CocoRegion::parse(found.at("segmentation")).mask(size);

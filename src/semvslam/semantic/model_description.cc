@@ -8,15 +8,15 @@
 
 #include "semvslam/data/file_io.h"
 #include "semvslam/semantic/json_fault.h"
+#include "semvslam/semantic/json_integer.h"
 
 namespace semvslam {
 namespace {
 
 constexpr int kFormat = 1;
 
-template <typename T, std::size_t N>
-std::array<T, N> array_of(const nlohmann::json& j, const char* key) {
-  const auto v = j.at(key).get<std::vector<T>>();
+template <std::size_t N, typename T>
+std::array<T, N> fixed(const std::vector<T>& v, const char* key) {
   if (v.size() != N) throw std::invalid_argument(fmt::format("'{}' has {} values, not {}", key, v.size(), N));
   std::array<T, N> out{};
   std::copy(v.begin(), v.end(), out.begin());
@@ -28,22 +28,24 @@ void check(bool condition, const char* what) {
 }
 
 void fill(ModelDescription& m, const nlohmann::json& j) {
-  check(j.at("format").get<int>() == kFormat, "'format' is not 1: exported by another version of training/export.py");
+  check(integer_at<int>(j, "format") == kFormat,
+        "'format' is not 1: exported by another version of training/export.py");
   m.name = j.at("name").get<std::string>();
   m.trunk = j.at("trunk").get<std::string>();
   m.box = j.at("box").get<std::string>();
   m.mask = j.at("mask").get<std::string>();
   m.trunk_int8 = j.value("trunk_int8", "");
-  m.input = {j.at("input").at("width").get<int>(), j.at("input").at("height").get<int>()};
-  m.pad = j.at("input").at("pad").get<int>();
+  m.input = {integer_at<int>(j.at("input"), "width"), integer_at<int>(j.at("input"), "height")};
+  m.pad = integer_at<int>(j.at("input"), "pad");
   m.classes = j.at("classes").get<std::vector<std::string>>();
-  m.strides = array_of<int, ModelDescription::kLevels>(j, "strides");
-  m.anchor_sizes = array_of<std::vector<float>, ModelDescription::kLevels>(j, "anchor_sizes");
+  m.strides = fixed<ModelDescription::kLevels>(integers_at<int>(j, "strides"), "strides");
+  m.anchor_sizes =
+      fixed<ModelDescription::kLevels>(j.at("anchor_sizes").get<std::vector<std::vector<float>>>(), "anchor_sizes");
   m.anchor_ratios = j.at("anchor_ratios").get<std::vector<float>>();
-  m.box_weights = array_of<float, 4>(j, "box_weights");
+  m.box_weights = fixed<4>(j.at("box_weights").get<std::vector<float>>(), "box_weights");
   m.box_levels = j.at("box_levels").get<std::vector<float>>();
   m.mask_levels = j.at("mask_levels").get<std::vector<float>>();
-  m.channels = j.at("feature_channels").get<int>();
+  m.channels = integer_at<int>(j, "feature_channels");
   m.semantic_share = j.at("semantic_share").get<float>();
   m.mask_threshold = j.at("mask_threshold").get<float>();
   if (const auto cost = j.find("gflops"); cost != j.end())
@@ -55,10 +57,13 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   check(m.mask_threshold > 0 && m.mask_threshold < 1, "'mask_threshold' is not within 0 .. 1");
   check(m.channels > 0 && m.channels <= 4096, "'feature_channels' is out of range");
   check(!m.anchor_ratios.empty() && !m.anchor_sizes[0].empty(), "no anchors");
-  for (const auto& sizes : m.anchor_sizes)
+  check(m.pad >= 0 && m.pad <= 255, "'pad' is not within 0 .. 255");
+  for (const auto& sizes : m.anchor_sizes) {
     check(sizes.size() == m.anchor_sizes[0].size(), "'anchor_sizes' differ in length");
-  for (const float r : m.anchor_ratios) check(r > 0, "'anchor_ratios' must be positive");
-  for (const float w : m.box_weights) check(w > 0, "'box_weights' must be positive");
+    for (const float s : sizes) check(s > 0 && s <= 4096, "'anchor_sizes' must be within 0 .. 4096 px");
+  }
+  for (const float r : m.anchor_ratios) check(r >= .01f && r <= 100, "'anchor_ratios' must be within 0.01 .. 100");
+  for (const float w : m.box_weights) check(w >= .01f && w <= 1e4f, "'box_weights' must be within 0.01 .. 10000");
   for (const int s : m.strides)
     check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
   check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels,

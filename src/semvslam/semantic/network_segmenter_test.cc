@@ -273,7 +273,7 @@ TEST_F(ShippedNetwork, PersonsAreFoundAtOtherWidthsAndInEightBits) {
   EXPECT_EQ(refused.error().code, ErrorCode::kUnsupported);
 }
 
-TEST_F(ShippedNetwork, WhereNoCameraWaitsAPictureIsSeenWiderButNotInEightBits) {
+TEST_F(ShippedNetwork, WhereNoCameraWaitsAPictureIsSeenWiderAndInFloats) {
   SegmenterOptions options;
   options.model = kModels.string();
   options.backend = "openvino";
@@ -285,6 +285,7 @@ TEST_F(ShippedNetwork, WhereNoCameraWaitsAPictureIsSeenWiderButNotInEightBits) {
   };
   EXPECT_THAT(input_of("f32", true), HasSubstr("640x480"));
   EXPECT_THAT(input_of("f32", false), HasSubstr("768x576"));
+  EXPECT_THAT(input_of("auto", false), HasSubstr("trunk.onnx, 768x576"));
   EXPECT_THAT(input_of("int8", false), HasSubstr("640x480"));
 }
 

@@ -41,9 +41,9 @@ Settled settle(const SegmenterOptions& options, bool openvino, ModelDescription&
   const int threads = options.threads > 0 ? options.threads : slow ? 2 : 1;
   Settled out{options.precision, threads};
   int width_px = options.input_width_px;
-  if (slow && options.precision == "auto") {
+  if (slow && options.keep_up && options.precision == "auto") {
     out.precision = model.trunk_int8.empty() ? "f32" : "int8";
-    if (width_px == 0 && options.keep_up)
+    if (width_px == 0)
       width_px =
           static_cast<int>((fast == FastNumbers::kEightBits ? kEightBitWidth : kSlowMachineWidth) * model.input.width);
   }

@@ -45,12 +45,14 @@ struct SegmenterOptions {
   std::string source = "network";  // network, folder, none
   std::string model;               // folder of the network's model.json; empty: the one that comes with semvslam
   std::string backend = "auto";    // auto, openvino, opencv
-  std::string precision = "auto";  // auto: the fastest of the machine; f32: the same everywhere; int8: eight bits
+  std::string precision = "auto";  // auto: by keep_up; f32: the same everywhere; int8: eight bits
   int input_width_px = 0;          // of the image that the network sees; 0 = by keep_up
-  bool keep_up = true;             // with a camera: the model's width, on slow machines less; without one more
-  std::string mask_folder;         // of source `folder`
-  double score = 0.45;             // least score of an instance: even odds, and a mask as sure as good ones are (0.9)
-  int threads = 2;                 // of the network; 0 = what suits the machine beside tracking
+  // With a camera: the fastest numbers of the machine, the model's width, on slow machines less. Without one: floats,
+  // and more than that width.
+  bool keep_up = true;
+  std::string mask_folder;  // of source `folder`
+  double score = 0.45;      // least score of an instance: even odds, and a mask as sure as good ones are (0.9)
+  int threads = 2;          // of the network; 0 = what suits the machine beside tracking
 
   void add_to(ConfigSchema& schema);
 };
