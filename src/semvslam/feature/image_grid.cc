@@ -1,5 +1,6 @@
 #include "semvslam/feature/image_grid.h"
 
+#include <cmath>
 #include <stdexcept>
 
 namespace semvslam {
@@ -11,6 +12,7 @@ void ImageGrid::build(std::span<const float> x_px, std::span<const float> y_px, 
   inverse_cell_ = 1.f / static_cast<float>(cell_px);
   if (width_px < 1 || height_px < 1) {
     columns_ = rows_ = 0;
+    indices_.clear();
     return;
   }
   columns_ = (width_px + cell_px - 1) / cell_px;
@@ -37,6 +39,24 @@ void ImageGrid::build(std::span<const float> x_px, std::span<const float> y_px, 
     x_[k] = x_px[i];
     y_[k] = y_px[i];
   }
+}
+
+std::size_t ImageGrid::find_near(float x_px, float y_px, float radius_px, std::span<std::uint32_t> out) const {
+  if (out.size() < size()) throw std::invalid_argument("ImageGrid::find_near: no room for all points");
+  std::size_t found = 0;
+  if (columns_ == 0) return found;
+  const int c0 = cell_of(x_px - radius_px, columns_), c1 = cell_of(x_px + radius_px, columns_);
+  const int r0 = cell_of(y_px - radius_px, rows_), r1 = cell_of(y_px + radius_px, rows_);
+  for (int r = r0; r <= r1; ++r) {
+    const std::uint32_t begin = cell_begin_[static_cast<std::size_t>(r * columns_ + c0)];
+    const std::uint32_t end = cell_begin_[static_cast<std::size_t>(r * columns_ + c1 + 1)];
+    for (std::uint32_t k = begin; k < end; ++k) {
+      const float dx = std::abs(x_[k] - x_px), dy = std::abs(y_[k] - y_px);
+      out[found] = indices_[k];  // not beyond its end: each point is visited at most once
+      found += static_cast<std::size_t>((dx <= radius_px) & (dy <= radius_px));
+    }
+  }
+  return found;
 }
 
 }  // namespace semvslam

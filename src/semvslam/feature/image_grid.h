@@ -16,10 +16,15 @@ class ImageGrid {
   /// cells.
   void build(std::span<const float> x_px, std::span<const float> y_px, int width_px, int height_px, int cell_px = 20);
 
-  /// Calls f(index) for every point with |dx| <= radius_px and |dy| <= radius_px, in ascending cell order
-  /// (row by row), within a cell in ascending index order. A negative or NaN radius finds nothing.
-  template <typename F>
-  void for_each_near(float x_px, float y_px, float radius_px, F&& f) const;
+  /// Finds the points with |dx| <= radius_px and |dy| <= radius_px: in ascending cell order (row by row), within a cell
+  /// in ascending index order. A negative or NaN radius finds nothing. No branch depends on a point: about half of
+  /// those in the cells lie in the square, and guessing which costs more than looking at all.
+  /// @param out their indices, at its front; has room for size() of them, else throws std::invalid_argument.
+  /// @return how many.
+  std::size_t find_near(float x_px, float y_px, float radius_px, std::span<std::uint32_t> out) const;
+
+  /// Points of the image.
+  std::size_t size() const { return indices_.size(); }
 
  private:
   // Clamped before the conversion: a float beyond int has no defined integer value. NaN goes to cell 0 and is never
@@ -35,20 +40,5 @@ class ImageGrid {
   std::vector<float> x_, y_;  // in the order of indices_
   std::vector<std::uint32_t> cell_of_point_;
 };
-
-template <typename F>
-void ImageGrid::for_each_near(float x_px, float y_px, float radius_px, F&& f) const {
-  if (columns_ == 0) return;
-  const int c0 = cell_of(x_px - radius_px, columns_), c1 = cell_of(x_px + radius_px, columns_);
-  const int r0 = cell_of(y_px - radius_px, rows_), r1 = cell_of(y_px + radius_px, rows_);
-  for (int r = r0; r <= r1; ++r) {
-    const std::uint32_t begin = cell_begin_[static_cast<std::size_t>(r * columns_ + c0)];
-    const std::uint32_t end = cell_begin_[static_cast<std::size_t>(r * columns_ + c1 + 1)];
-    for (std::uint32_t k = begin; k < end; ++k) {
-      const float dx = x_[k] - x_px, dy = y_[k] - y_px;
-      if (dx <= radius_px && -dx <= radius_px && dy <= radius_px && -dy <= radius_px) f(indices_[k]);
-    }
-  }
-}
 
 }  // namespace semvslam

@@ -12,8 +12,8 @@ namespace semvslam {
 namespace {
 
 std::vector<std::uint32_t> near(const ImageGrid& grid, float x, float y, float radius) {
-  std::vector<std::uint32_t> found;
-  grid.for_each_near(x, y, radius, [&](std::uint32_t i) { found.push_back(i); });
+  std::vector<std::uint32_t> found(grid.size());
+  found.resize(grid.find_near(x, y, radius, found));
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -86,6 +86,8 @@ TEST(ImageGrid, RefusesWhatMakesNoSense) {
   ImageGrid grid;
   EXPECT_THROW(grid.build(std::vector<float>{1}, {}, 64, 64), std::invalid_argument);
   EXPECT_THROW(grid.build({}, {}, 64, 64, 0), std::invalid_argument);
+  grid.build(std::vector<float>{1}, std::vector<float>{1}, 64, 64);
+  EXPECT_THROW(grid.find_near(1, 1, 1, {}), std::invalid_argument);
 }
 
 }  // namespace

@@ -18,33 +18,53 @@ bool passes_ratio(int best, int rival, float ratio) {
   return rival == kNoDistance || static_cast<float>(best) <= ratio * static_cast<float>(rival);
 }
 
+/// A feature and its distance in one number: the least is the nearest, and the lowest index among equally near ones.
 struct Candidate {
-  std::uint32_t feature;
-  int distance;
+  std::uint64_t key;
+  Candidate(std::uint32_t feature, int distance) : key(static_cast<std::uint64_t>(distance) << 32 | feature) {}
+  std::uint32_t feature() const { return static_cast<std::uint32_t>(key); }
+  int distance() const { return static_cast<int>(key >> 32); }
 };
 
-/// The features in the query's square and level range, each with its distance.
-void collect_candidates(const ProjectedQuery& query, const OrbFeatures& features, const ImageGrid& grid,
-                        std::vector<Candidate>& out) {
-  out.clear();
-  grid.for_each_near(query.x_px, query.y_px, query.radius_px, [&](std::uint32_t i) {
-    const int level = features.keypoints[i].level;
-    if (level < query.min_level || level > query.max_level) return;
-    out.push_back({i, hamming_distance(query.descriptor, features.descriptors[i])});
-  });
-}
+/// Finds the candidates of one query after the other: the features in its square and level range. Which those are is
+/// hardly predictable, so they are sorted out without branches.
+class CandidateFinder {
+ public:
+  CandidateFinder(const OrbFeatures& features, const ImageGrid& grid)
+      : features_(features), grid_(grid), near_(grid.size()) {}
+
+  std::span<const Candidate> find(const ProjectedQuery& query) {
+    const std::size_t near = grid_.find_near(query.x_px, query.y_px, query.radius_px, near_);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < near; ++k) {
+      const std::uint32_t i = near_[k];
+      const int level = features_.keypoints[i].level;
+      near_[kept] = i;
+      kept += static_cast<std::size_t>((level >= query.min_level) & (level <= query.max_level));
+    }
+    candidates_.clear();
+    for (std::size_t k = 0; k < kept; ++k)
+      candidates_.emplace_back(near_[k], hamming_distance(query.descriptor, features_.descriptors[near_[k]]));
+    return candidates_;
+  }
+
+ private:
+  const OrbFeatures& features_;
+  const ImageGrid& grid_;
+  std::vector<std::uint32_t> near_;
+  std::vector<Candidate> candidates_;
+};
 
 bool is_same_place(const Keypoint& a, const Keypoint& b) {
   return a.level != b.level && std::abs(a.x_px - b.x_px) <= kSamePlacePx && std::abs(a.y_px - b.y_px) <= kSamePlacePx;
 }
 
 /// Whether another place of the image looks nearly as good as the best one.
-bool has_rival(const Candidate& best, const std::vector<Candidate>& candidates, const OrbFeatures& features,
-               float ratio) {
-  const Keypoint& place = features.keypoints[best.feature];
+bool has_rival(const Candidate& best, std::span<const Candidate> candidates, const OrbFeatures& features, float ratio) {
+  const Keypoint& place = features.keypoints[best.feature()];
   return std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) {
-    return c.feature != best.feature && !passes_ratio(best.distance, c.distance, ratio) &&
-           !is_same_place(place, features.keypoints[c.feature]);
+    return c.key != best.key && !passes_ratio(best.distance(), c.distance(), ratio) &&
+           !is_same_place(place, features.keypoints[c.feature()]);
   });
 }
 
@@ -149,17 +169,13 @@ class WordColumns {
 void match_projected(std::span<const ProjectedQuery> queries, const OrbFeatures& features, const ImageGrid& grid,
                      const MatchOptions& options, std::vector<Match>& out) {
   out.clear();
-  std::vector<Candidate> candidates;
+  CandidateFinder finder(features, grid);
   for (std::size_t q = 0; q < queries.size(); ++q) {
-    const ProjectedQuery& query = queries[q];
-    collect_candidates(query, features, grid, candidates);
-    const auto best =
-        std::min_element(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-          return a.distance != b.distance ? a.distance < b.distance : a.feature < b.feature;
-        });
-    if (best == candidates.end() || best->distance > options.max_distance) continue;
+    const std::span<const Candidate> candidates = finder.find(queries[q]);
+    const auto best = std::ranges::min_element(candidates, {}, &Candidate::key);
+    if (best == candidates.end() || best->distance() > options.max_distance) continue;
     if (options.ratio < 1.f && has_rival(*best, candidates, features, options.ratio)) continue;
-    out.push_back({static_cast<int>(q), static_cast<int>(best->feature), best->distance});
+    out.push_back({static_cast<int>(q), static_cast<int>(best->feature()), best->distance()});
   }
   if (options.check_rotation) drop_odd_rotations(queries, features, out);
   make_one_to_one(features.size(), out);
