@@ -133,10 +133,14 @@ nlohmann::json as_json(const std::vector<RepairCase>& cases, const std::vector<R
 }
 
 Result<std::unique_ptr<Segmenter>> masks_of(const EvalRepairArguments& a) {
-  if (a.masks == "network") return make_segmenter(a.segmenter, RoleTable());
-  const Result<std::filesystem::path> folder = find_folder(a.sequence, a.masks);
-  if (!folder) return folder.error();
-  return FolderSegmenter::open(*folder, RoleTable());
+  SegmenterOptions options = a.segmenter;
+  if (a.masks != "network") {
+    const Result<std::filesystem::path> folder = find_folder(a.sequence, a.masks);
+    if (!folder) return folder.error();
+    options.source = "folder";
+    options.mask_folder = folder->string();
+  }
+  return make_segmenter(options, RoleTable());
 }
 
 Result<int> run_eval_repair(EvalRepairArguments a) {
@@ -151,7 +155,7 @@ Result<int> run_eval_repair(EvalRepairArguments a) {
   if (!source) return source.error();
   const Result<std::unique_ptr<Segmenter>> given = masks_of(a);
   if (!given) return given.error();
-  const Result<std::unique_ptr<Segmenter>> truth =
+  const Result<std::unique_ptr<FolderSegmenter>> truth =
       FolderSegmenter::open(std::filesystem::path(a.sequence) / a.truth, RoleTable());
   if (!truth) return truth.error();
   TrueMotion motion{{}};

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace semvslam {
@@ -15,6 +16,14 @@ Json stage_to_json(const StageSummary& s) {
 
 double per_frame(double seconds, std::uint64_t frames) {
   return frames == 0 ? 0 : seconds * 1e3 / static_cast<double>(frames);
+}
+
+/// Null when there is nothing.
+Json median_of(std::vector<double> values) {
+  if (values.empty()) return nullptr;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 template <typename Name, std::size_t N>
@@ -79,7 +88,9 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                      {"tracked_on_moving", run.truth->tracked_on_moving.value()},
                      {"static_dropped", run.truth->static_dropped.value()},
                      {"clear_static_dropped", run.truth->clear_static_dropped.value()},
-                     {"static_barred", run.truth->static_barred.value()}};
+                     {"static_barred", run.truth->static_barred.value()},
+                     {"pixel_recall", median_of(run.truth->pixel_recalls)},
+                     {"pixel_precision", median_of(run.truth->pixel_precisions)}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

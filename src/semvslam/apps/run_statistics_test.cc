@@ -37,6 +37,15 @@ TEST(RunStatistics, JsonHoldsEveryNumber) {
   EXPECT_DOUBLE_EQ(json["peak_memory_mb"].get<double>(), 123);
 }
 
+TEST(RunStatistics, PixelsOfTrueMasksAreMediansOverFrames) {
+  RunRecord r = record();
+  r.truth.emplace();
+  r.truth->pixel_recalls = {.9, .1, .8};
+  const auto json = nlohmann::json::parse(format_statistics(r, statistics()));
+  EXPECT_DOUBLE_EQ(json["truth"]["pixel_recall"].get<double>(), .8);
+  EXPECT_TRUE(json["truth"]["pixel_precision"].is_null());
+}
+
 TEST(RunStatistics, ARunWithoutFramesHasNoDivisionByZero) {
   const auto json = nlohmann::json::parse(format_statistics(RunRecord{}, SlamStatistics{}));
   EXPECT_EQ(json["tracked_share"], 0.0);

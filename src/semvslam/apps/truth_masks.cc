@@ -9,7 +9,7 @@ namespace {
 
 class FolderTruth final : public TruthMaskSink {
  public:
-  FolderTruth(std::unique_ptr<Segmenter> masks, const OrbOptions& orb, int outline_px)
+  FolderTruth(std::unique_ptr<FolderSegmenter> masks, const OrbOptions& orb, int outline_px)
       : masks_(std::move(masks)), extractor_(orb), outline_px_(outline_px) {}
 
   void on_frame(const RgbdFrame& frame, const TrackResult& result) override {
@@ -17,12 +17,14 @@ class FolderTruth final : public TruthMaskSink {
     request.frame = frame.id;
     request.stamp = frame.stamp;
     request.image = frame.gray;
+    if (!masks_->has(request)) return;
     const Result<Segmentation> truth = masks_->segment(request);
     if (!truth) return;
     const cv::Mat moving = truth->mask_of(Role::kStatic);  // whatever its class: all in the folder moves
     cv::Mat near_moving = moving.clone();
     grow_mask(near_moving, outline_px_);
     ++counts_.frames;
+    compare_pixels(moving, result.dynamic->moving);
     for (const FeatureMark& mark : result.dynamic->features) {
       if (mark.use == kNotUsed || (mark.use == kKnownLandmarkOnly && !mark.tracked)) continue;
       counts_.kept_on_moving.count(is_masked(moving, mark.pixel));
@@ -50,7 +52,17 @@ class FolderTruth final : public TruthMaskSink {
   const TruthCounts& counts() const override { return counts_; }
 
  private:
-  std::unique_ptr<Segmenter> masks_;
+  /// @param widened what the policy masked, its outline moved outwards; empty = nothing.
+  void compare_pixels(const cv::Mat& moving, const cv::Mat& widened) {
+    cv::Mat masked = cv::Mat::zeros(moving.size(), CV_8UC1);
+    if (!widened.empty()) without_rim(widened, outline_px_, masked);
+    const int all = cv::countNonZero(moving), found = cv::countNonZero(masked),
+              both = cv::countNonZero(moving & masked);
+    if (all > 0) counts_.pixel_recalls.push_back(static_cast<double>(both) / all);
+    if (found > 0) counts_.pixel_precisions.push_back(static_cast<double>(both) / found);
+  }
+
+  std::unique_ptr<FolderSegmenter> masks_;
   OrbExtractor extractor_;
   int outline_px_;
   OrbFeatures whole_;
@@ -61,7 +73,7 @@ class FolderTruth final : public TruthMaskSink {
 
 Result<std::shared_ptr<TruthMaskSink>> TruthMaskSink::open(const std::filesystem::path& folder, const OrbOptions& orb,
                                                            int outline_px) {
-  Result<std::unique_ptr<Segmenter>> masks = FolderSegmenter::open(folder, RoleTable());
+  Result<std::unique_ptr<FolderSegmenter>> masks = FolderSegmenter::open(folder, RoleTable());
   if (!masks) return masks.error();
   return std::shared_ptr<TruthMaskSink>(std::make_shared<FolderTruth>(std::move(*masks), orb, outline_px));
 }

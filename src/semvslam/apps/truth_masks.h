@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "semvslam/base/result.h"
 #include "semvslam/pipeline/slam.h"
@@ -25,6 +26,9 @@ struct TruthCounts {
   Share clear_static_dropped;
   /// Of the features on the static scene that are not dropped: those that no landmark was found at and may come from.
   Share static_barred;
+  /// Per frame: of the moving things' pixels those that the policy masked, and of those that it masked the moving ones.
+  /// The outline is the policy's own, before it is widened for features. Frames without either are not listed.
+  std::vector<double> pixel_recalls, pixel_precisions;
 };
 
 /// Compares what the policy left out with true masks. Extracts the features of every whole image once more to know what

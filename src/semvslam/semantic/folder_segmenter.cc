@@ -56,7 +56,7 @@ std::string differs(cv::Size file, cv::Size image) {
 
 }  // namespace
 
-Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder, const RoleTable& roles) {
+Result<std::unique_ptr<FolderSegmenter>> FolderSegmenter::open(const fs::path& folder, const RoleTable& roles) {
   std::error_code ec;
   if (!fs::is_directory(folder, ec))
     return Error{ErrorCode::kNotFound, fmt::format("{}: no such folder of masks", folder.string())};
@@ -74,7 +74,7 @@ Result<std::unique_ptr<Segmenter>> FolderSegmenter::open(const fs::path& folder,
     return Error{ErrorCode::kNotFound, fmt::format("{}: holds no PNG or JSON file with masks", folder.string())};
   if (const Status s = out->read_roles(); !s) return s.error();
   if (out->names_.empty()) out->names_.push_back("person");
-  return std::unique_ptr<Segmenter>(std::move(out));
+  return out;
 }
 
 Status FolderSegmenter::read_roles() {

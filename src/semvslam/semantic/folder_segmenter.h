@@ -16,11 +16,13 @@ namespace semvslam {
 class FolderSegmenter final : public Segmenter {
  public:
   /// Errors: no such folder, no such file in it, a roles.json that is damaged.
-  static Result<std::unique_ptr<Segmenter>> open(const std::filesystem::path& folder, const RoleTable& roles);
+  static Result<std::unique_ptr<FolderSegmenter>> open(const std::filesystem::path& folder, const RoleTable& roles);
 
   /// The file with the request's name, else with the nearest stamp within 20 ms. No file = no instances. Errors: a
   /// damaged file, another size than the image's.
   Result<Segmentation> segment(const SegmentationRequest& request) override;
+  /// Whether there is a file for it: an image without one was perhaps only not looked at.
+  bool has(const SegmentationRequest& request) const { return find(request) != nullptr; }
   /// Grows with the classes that JSON files name; a class keeps its place.
   const std::vector<std::string>& class_names() const override { return names_; }
   std::string description() const override;

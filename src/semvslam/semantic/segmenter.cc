@@ -97,7 +97,11 @@ void SegmenterOptions::add_to(ConfigSchema& schema) {
 Result<std::unique_ptr<Segmenter>> make_segmenter(const SegmenterOptions& options, const RoleTable& roles,
                                                   StageTimers* timers) {
   if (options.source == "none") return std::unique_ptr<Segmenter>(std::make_unique<NoSegmenter>());
-  if (options.source == "folder") return FolderSegmenter::open(options.mask_folder, roles);
+  if (options.source == "folder") {
+    Result<std::unique_ptr<FolderSegmenter>> folder = FolderSegmenter::open(options.mask_folder, roles);
+    if (!folder) return folder.error();
+    return std::unique_ptr<Segmenter>(std::move(*folder));
+  }
   if (options.source == "network") return make_network(options, roles, timers);
   return Error{ErrorCode::kInvalidInput,
                fmt::format("segment.source: '{}' is none of network, folder, none", options.source)};
