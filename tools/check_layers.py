@@ -28,14 +28,14 @@ ALLOWED = {
     "tracking": {"data", "feature", "map", "solve", "dynamic", "geometry"},
     "mapping": {"feature", "map", "solve", "geometry"},
     "loop": {"feature", "place", "map", "solve", "geometry"},
-    "dense": {"data", "semantic", "dynamic", "map", "geometry"},
+    "dense": {"data", "geometry"},
     "pipeline": CORE,
     "apps": {"pipeline", "eval", "render", "data"} | CORE,
 }
 
 # library -> (how its headers begin, modules whose sources may include them). `map` and `pipeline` see frames through data.
 FOREIGN = {
-    "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "tracking", "map"}),
+    "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "dense", "tracking", "map"}),
     "Ceres": (re.compile(r"ceres/"), {"solve"}),
     "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),

@@ -10,6 +10,7 @@
 #include "semvslam/apps/run_session.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/data/sequence.h"
+#include "semvslam/dense/point_cloud.h"
 
 namespace semvslam {
 namespace {
@@ -17,7 +18,8 @@ namespace {
 constexpr const char* kDefaultMode = "full";
 
 struct RunArguments {
-  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks;
+  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks,
+      dense_map;
   std::vector<std::string> assignments;
   std::uint64_t max_frames = 0;
   bool deterministic = false, realtime = false, quiet = false;
@@ -69,6 +71,10 @@ Result<int> run(const RunArguments& a) {
     if (!masks) return masks.error();
     options.truth_masks = std::move(*masks);
   }
+  if (!a.dense_map.empty()) {
+    options.dense_map = a.dense_map;
+    if (const Status status = check_cloud_name(options.dense_map); !status) return status.error();
+  }
   if (a.max_frames > 0) options.max_frames = a.max_frames;
   return run_recording(a.sequence, std::move(sequence_options), config, options);
 }
@@ -94,6 +100,9 @@ CommandHandler setup_run(CLI::App& parser) {
                     "folder for a PNG per key frame, 255 = pixel of something that moves; none where nothing does");
   parser.add_option("--truth-masks", a->truth_masks,
                     "folder with the true masks (PNG, as given or in the sequence): stats.json gets a part `truth`");
+  parser.add_option(
+      "--dense-map", a->dense_map,
+      "file (.ply or .pcd) for a coloured point cloud of the static scene, made of the key frames at the end");
   parser.add_option("--max-frames", a->max_frames, "stop after this many frames")
       ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   parser.add_flag("--deterministic", a->deterministic, "two runs give the same bytes (slower: one thread)");

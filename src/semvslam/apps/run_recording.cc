@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include "semvslam/apps/command.h"
+#include "semvslam/apps/dense_map.h"
 #include "semvslam/apps/run_session.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/data/sequence.h"
@@ -27,7 +28,6 @@ Status score(const Trajectory& truth, const std::string& truth_name, const Traje
 /// Prints what came of a run. @return as run_recording.
 Result<int> conclude(const RunOutcome& outcome, const std::filesystem::path& sequence,
                      const std::filesystem::path& out) {
-  fmt::print("{}", format_summary(outcome.record, outcome.statistics));
   Status scored;
   if (const Result<Trajectory> truth = read_ground_truth(sequence); truth)
     scored = score(*truth, sequence.string(), outcome.trajectory, out);
@@ -49,8 +49,16 @@ Result<int> run_recording(const std::filesystem::path& sequence, SequenceOptions
     sequence_options.on_warning = [](const std::string& line) { fmt::print(stderr, "semvslam: warning: {}\n", line); };
   Result<std::unique_ptr<FrameSource>> source = open_sequence(sequence, sequence_options);
   if (!source) return source.error();
-  const Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
+  Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
   if (!outcome) return outcome.error();
+  fmt::print("{}", format_summary(outcome->record, outcome->statistics));
+  if (!options.dense_map.empty() && !outcome->key_frames.empty()) {
+    sequence_options.on_warning = nullptr;  // said before
+    const Result<DenseMapSummary> dense = make_dense_map(sequence, sequence_options, outcome->key_frames,
+                                                         outcome->key_frame_masks, config.dense, options.dense_map);
+    if (dense) fmt::print("{}", format_summary(*dense));
+    if (!dense && outcome->status) outcome->status = dense.error();
+  }
   return conclude(*outcome, sequence, options.out);
 }
 

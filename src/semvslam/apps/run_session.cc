@@ -306,10 +306,12 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   }
   outcome.statistics = (*slam)->statistics();
   outcome.trajectory = (*slam)->trajectory();
+  outcome.key_frames = (*slam)->key_frame_trajectory();
+  outcome.key_frame_masks = (*slam)->key_frame_masks();
   keep_first(outcome.status,
-             output->write_results(outcome.trajectory, (*slam)->key_frame_trajectory(), (*slam)->landmark_positions()));
+             output->write_results(outcome.trajectory, outcome.key_frames, (*slam)->landmark_positions()));
   if (!options.key_frame_masks.empty())
-    keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, (*slam)->key_frame_masks()));
+    keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, outcome.key_frame_masks));
   keep_first(outcome.status, output->write("stats.json", format_statistics(outcome.record, outcome.statistics)));
   if (outcome.status && outcome.signal == 0 && outcome.statistics.tracked == 0)
     outcome.status =

@@ -28,6 +28,7 @@ struct RunOptions {
   std::filesystem::path debug_frames;     // folder for a picture per frame of what was taken for moving; empty = none
   std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
   std::filesystem::path truth_masks;      // folder of true masks to judge the policy by; empty = none
+  std::filesystem::path dense_map;        // point cloud (.ply, .pcd) to make of the key frames at the end; empty = none
   ProcessTime before;                     // spent on something else, as the demo on rendering: not counted to the run
 };
 
@@ -36,8 +37,10 @@ struct RunOutcome {
   RunRecord record;
   SlamStatistics statistics;
   Trajectory trajectory;  // as in trajectory.txt
-  int signal = 0;         // that ended it early; 0 = none
-  Status status;          // why it is not a success although results were written
+  Trajectory key_frames;  // as in keyframes.txt
+  std::vector<KeyFrameMask> key_frame_masks;
+  int signal = 0;  // that ended it early; 0 = none
+  Status status;   // why it is not a success although results were written
 };
 
 /// Runs the system over all frames of `source` and writes the results. A frame that cannot be used is skipped, counted

@@ -101,6 +101,7 @@ ConfigSchema Config::schema() {
   segment.add_to(s);
   dynamic.add_to(s);
   damage.add_to(s);
+  dense.add_to(s);
   return s;
 }
 
@@ -112,6 +113,9 @@ Status Config::apply_mode(const std::string& name) {
   return Status::success();
 }
 
-Status Config::check() const { return dynamic.check(); }
+Status Config::check() const {
+  if (Status status = dynamic.check(); !status) return status;
+  return dense.check();
+}
 
 }  // namespace semvslam

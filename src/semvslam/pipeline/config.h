@@ -4,6 +4,7 @@
 
 #include "semvslam/base/config_schema.h"
 #include "semvslam/base/result.h"
+#include "semvslam/dense/voxel_map.h"
 #include "semvslam/dynamic/dynamic_filter.h"
 #include "semvslam/feature/orb_extractor.h"
 #include "semvslam/map/frame_features.h"
@@ -28,6 +29,7 @@ struct Config {
   SegmenterOptions segment;
   DynamicOptions dynamic;
   MaskDamageOptions damage;  // experiments on the restoration of masks
+  DenseOptions dense;        // of a map that is made of the key frames after a run
 
   /// The description of every value, bound to the fields of this object (which must outlive it and not move).
   ConfigSchema schema();
