@@ -67,14 +67,27 @@ class ProgramTest(ProgramCase):
         self.assertEqual(stats["landmarks"], count)
         self.assertEqual(12 * count, len(body))
 
+    def test_a_dense_map_is_made_on_request(self):
+        cloud = self.folder / "new" / "cloud.pcd"
+        done = call("run", self.whole, "--out", self.out, "--max-frames", 20, "--dense-map", cloud, "--quiet")
+        self.assertEqual(0, done.returncode, done.stderr)
+        header, body = cloud.read_bytes().split(b"DATA binary\n", 1)
+        count = int(header.split(b"POINTS ")[1].split()[0])
+        self.assertLess(5000, count)
+        self.assertEqual(16 * count, len(body))
+        self.assertIn(f"dense map {count} points", done.stdout)
+        self.assertFalse((self.out / "dense.ply").exists())
+
     def test_deterministic_runs_are_equal(self):
         runs = [self.out / name for name in ("a", "b")]
-        self.assertEqual(0, call("run", self.whole, "--out", runs[0], "--deterministic", "--quiet").returncode)
+        self.assertEqual(0, call("run", self.whole, "--out", runs[0], "--deterministic", "--quiet",
+                                 "--dense-map", runs[0] / "dense.ply").returncode)
         # The second one on a single processor: the order of threads must not matter either.
         one = {min(os.sched_getaffinity(0))}
         self.assertEqual(0, call("run", self.whole, "--out", runs[1], "--deterministic", "--quiet",
+                                 "--dense-map", runs[1] / "dense.ply",
                                  preexec_fn=lambda: os.sched_setaffinity(0, one)).returncode)
-        for name in ("trajectory.txt", "keyframes.txt", "map.ply"):
+        for name in ("trajectory.txt", "keyframes.txt", "map.ply", "dense.ply"):
             self.assertTrue(filecmp.cmp(runs[0] / name, runs[1] / name, shallow=False), name)
 
     def test_max_frames(self):
@@ -92,6 +105,8 @@ class ProgramTest(ProgramCase):
         self.expect_error(call(*run, "--mode", "magic"), 3, "--mode: mode must be one of orb,", "'magic'")
         self.expect_error(call(*run, "--masks", "nowhere"), 3, "nowhere: no such folder")
         self.expect_error(call(*run, "--truth-masks", "nowhere"), 3, "nowhere: no such folder")
+        self.expect_error(call(*run, "--dense-map", "cloud.xyz"), 3, "cloud.xyz", ".ply or .pcd")
+        self.expect_error(call(*run, "--set", "dense.max_depth_m=0.2"), 3, "dense.min_depth_m = 0.3")
 
     def test_missing_and_empty_sequences(self):
         self.expect_error(call("run", self.folder / "nothing", "--out", self.out), 3, "nothing")

@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "semvslam/apps/render_scene.h"
 
 namespace semvslam {
@@ -59,6 +62,70 @@ TEST_F(DenseMapTest, AKeyFrameThatCannotBeReadAgainIsCountedAsAbsent) {
 TEST_F(DenseMapTest, AFolderThatIsNoneAndADiskThatRefusesAreErrors) {
   EXPECT_FALSE(make_dense_map(folder_ / "absent", {}, poses_, {}, {}, folder_ / "map.ply"));
   EXPECT_FALSE(make(folder_ / "absent" / "map.ply", {poses_[0]}));
+}
+
+/// The same room without people and with them, exact pictures and poses.
+class RoomWithPeople : public testing::Test {
+ protected:
+  void SetUp() override {
+    empty_ = render("none");
+    people_ = render("walking");
+  }
+
+  std::vector<RenderedFrame> render(const std::string& people) {
+    SceneOptions options;
+    options.people = people;
+    options.frames = 10;
+    options.frame_rate_hz = 2;
+    options.width_px = 320, options.height_px = 240;
+    options.noise = false;
+    Result<RenderedScene> scene = RenderedScene::create(options);
+    if (!scene) throw std::runtime_error(scene.error().message);
+    camera_ = scene->camera();
+    std::vector<RenderedFrame> frames;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(options.frames); ++k) frames.push_back(scene->render(k));
+    return frames;
+  }
+
+  /// Share of the points that stand where the empty room's pictures look through.
+  double ghosts(const std::vector<CloudPoint>& points) const {
+    std::size_t count = 0;
+    for (const CloudPoint& point : points)
+      count += std::any_of(empty_.begin(), empty_.end(), [&](const RenderedFrame& view) {
+        const Eigen::Vector3d p = view.world_from_camera.inverse() * point.position_m.cast<double>();
+        if (p.z() < .3) return false;
+        const Eigen::Vector2d pixel = camera_.distort(camera_.project(p));
+        const cv::Rect around(static_cast<int>(std::lround(pixel.x())) - 1,
+                              static_cast<int>(std::lround(pixel.y())) - 1, 3, 3);
+        if ((around & cv::Rect(0, 0, camera_.width_px, camera_.height_px)) != around) return false;
+        double nearest = 0;
+        cv::minMaxLoc(view.frame.depth(around), &nearest);
+        return nearest > p.z() + .1;
+      });
+    return static_cast<double>(count) / static_cast<double>(points.size());
+  }
+
+  Camera camera_;
+  std::vector<RenderedFrame> empty_, people_;
+};
+
+TEST_F(RoomWithPeople, MasksKeepThemOutAndFreeSpaceClearsWhatMasksMissed) {
+  DenseOptions trusting;
+  trusting.seen_through = 1000;  // free space clears nothing
+  VoxelMap neither(camera_, trusting), masked(camera_, trusting), cleared(camera_, {});
+  for (const RenderedFrame& view : people_) {
+    ASSERT_TRUE(neither.integrate(view.frame, {}, view.world_from_camera));
+    ASSERT_TRUE(masked.integrate(view.frame, view.instances, view.world_from_camera));
+    ASSERT_TRUE(cleared.integrate(view.frame, {}, view.world_from_camera));
+  }
+  const double with_people = ghosts(neither.points());
+  EXPECT_GT(with_people, .02);
+  EXPECT_LT(ghosts(masked.points()), .02 * with_people);
+  // In half of the pictures somebody stands near the camera; what he hides is seen by few others.
+  EXPECT_LT(ghosts(cleared.points()), .6 * with_people);
+  VoxelMap room(camera_, {});
+  for (const RenderedFrame& view : empty_) ASSERT_TRUE(room.integrate(view.frame, {}, view.world_from_camera));
+  EXPECT_LT(ghosts(room.points()), 1e-3);
 }
 
 }  // namespace

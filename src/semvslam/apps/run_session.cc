@@ -277,6 +277,9 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   }
   if (!options.key_frame_masks.empty())
     if (const Status status = make_folder(options.key_frame_masks); !status) return status.error();
+  // Now: after the run is late to find out that there is no place for it.
+  if (options.dense_map.has_parent_path())
+    if (const Status status = make_folder(options.dense_map.parent_path()); !status) return status.error();
   std::shared_ptr<TruthMaskSink> truth;
   if (!options.truth_masks.empty()) {
     Result<std::shared_ptr<TruthMaskSink>> opened =
