@@ -72,6 +72,7 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"tracked_share", share},
                {"key_frames", slam.key_frames},
                {"landmarks", slam.landmarks},
+               {"relocalised", slam.relocalised},
                {"revisits", slam.revisits},
                {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
                {"notices", slam.notices},

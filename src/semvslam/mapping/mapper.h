@@ -7,6 +7,7 @@
 #include "semvslam/feature/matching.h"
 #include "semvslam/map/local_map.h"
 #include "semvslam/map/map.h"
+#include "semvslam/mapping/relocalise.h"
 #include "semvslam/mapping/revisit.h"
 #include "semvslam/solve/bundle_adjustment.h"
 
@@ -26,6 +27,7 @@ struct MappingOptions {
   double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others
   LocalMapOptions local_map;
   RevisitOptions revisit;
+  RelocaliseOptions relocalise;
 };
 
 /// A key frame as tracking saw it, ready to be put into the map.
@@ -52,6 +54,14 @@ class Mapper {
   std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});
   /// Full bundle adjustment over every key frame and landmark.
   void adjust_all(std::stop_token stop = {});
+  /// Looks for a lost frame in the whole map; nothing when it is nowhere, or not to be looked for.
+  std::optional<Relocalisation> relocalise(const FrameFeatures& features) const {
+    return options_.relocalise.enabled ? semvslam::relocalise(map_, features, options_.relocalise) : std::nullopt;
+  }
+  /// The snapshot around a key frame of the map, for tracking to go on there.
+  std::shared_ptr<const LocalMap> local_map(KeyFrameId reference) const {
+    return make_local_map(map_, reference, options_.local_map);
+  }
   /// How a landmark fared in the frames since the last key frame: in how many it should have been seen, was found, and
   /// was looked through by the depth image. One that was mostly looked through is gone and removed.
   void count_use(LandmarkId id, int visible, int found, int seen_through);

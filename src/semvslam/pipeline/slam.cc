@@ -6,6 +6,7 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <variant>
 
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/pipeline/segmentation_stage.h"
@@ -24,8 +25,11 @@ struct Slam::Impl {
         requests(static_cast<std::size_t>(c.mapping_queue)) {}
 
   void map_key_frame(KeyFrameRequest request);
+  void search(const SearchRequest& request);
   void run_mapping();
   void submit(KeyFrameRequest request);
+  void submit(SearchRequest request);
+  void resume_where_found();
   std::shared_ptr<const LocalMap> newest_map() const {
     std::lock_guard lock(slot_mutex);
     return newest;
@@ -50,10 +54,13 @@ struct Slam::Impl {
   mutable std::mutex map_mutex;  // a query never sees half a mapping step
   Mapper mapper;
 
-  BoundedQueue<KeyFrameRequest> requests;  // blocks when full, unless realtime: then the tracker asks again later
+  using Request = std::variant<KeyFrameRequest, SearchRequest>;
+  BoundedQueue<Request> requests;  // blocks when full, unless realtime: then the tracker asks again later
   mutable std::mutex slot_mutex;
   std::condition_variable published;
   std::shared_ptr<const LocalMap> newest;
+  bool searching = false;           // a lost frame is being looked for; one at a time
+  std::optional<FoundAgain> found;  // taken by the next frame
   std::exception_ptr failure;
   std::jthread mapping_thread;
 
@@ -63,7 +70,8 @@ struct Slam::Impl {
   };
   mutable std::mutex record_mutex;
   std::vector<Record> records;
-  std::uint64_t frames = 0, lost = 0;
+  std::uint64_t frames = 0, lost = 0, found_again = 0;
+  std::uint64_t lost_in_a_row = 0;
   DynamicTotals dynamic;
   std::vector<std::string> notices;
   FrameId next_frame{0};
@@ -96,9 +104,35 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
   published.notify_all();
 }
 
+void Slam::Impl::search(const SearchRequest& request) {
+  std::optional<FoundAgain> again;
+  {
+    std::lock_guard lock(map_mutex);
+    const auto timer = timers["mapping.relocalise"].time();
+    if (std::optional<Relocalisation> r = mapper.relocalise(*request.features)) {
+      const SE3 reference = mapper.map().key_frame(r->key_frame)->camera_from_world;
+      again = FoundAgain{request.features,
+                         std::move(r->landmarks),
+                         {r->key_frame, r->camera_from_world * reference.inverse()},
+                         mapper.local_map(r->key_frame)};
+    }
+  }
+  {
+    std::lock_guard lock(slot_mutex);
+    found = std::move(again);
+    searching = false;
+  }
+  published.notify_all();
+}
+
 void Slam::Impl::run_mapping() {
   try {
-    while (std::optional<KeyFrameRequest> request = requests.pop()) map_key_frame(std::move(*request));
+    while (std::optional<Request> request = requests.pop()) {
+      if (auto* key_frame = std::get_if<KeyFrameRequest>(&*request))
+        map_key_frame(std::move(*key_frame));
+      else
+        search(std::get<SearchRequest>(*request));
+    }
   } catch (...) {
     {
       std::lock_guard lock(slot_mutex);
@@ -119,6 +153,39 @@ void Slam::Impl::submit(KeyFrameRequest request) {
     // Nothing can be tracked before there is a map, and the first one takes a millisecond.
     if (first) wait_for_first_map();
   }
+}
+
+void Slam::Impl::submit(SearchRequest request) {
+  // Lost for long, in a place that is not in the map perhaps: no need to search it for every frame.
+  constexpr std::uint64_t kEvery = 5;
+  if (lost_in_a_row > kEvery && lost_in_a_row % kEvery != 0) return;
+  if (config.deterministic) return search(request);
+  {
+    std::lock_guard lock(slot_mutex);
+    if (searching) return;
+    searching = true;
+  }
+  Request wrapped = std::move(request);
+  if (config.realtime) {
+    if (requests.try_push(wrapped)) return;  // found by a later frame
+    std::lock_guard lock(slot_mutex);
+    searching = false;
+  } else if (requests.push(std::move(wrapped))) {
+    // A recording has time: no more frames than this one are lost.
+    std::unique_lock lock(slot_mutex);
+    published.wait(lock, [&] { return !searching || failure != nullptr; });
+  }
+}
+
+void Slam::Impl::resume_where_found() {
+  std::lock_guard lock(slot_mutex);
+  if (!found) return;
+  if (tracker.resume(*found)) {
+    newest = found->local;
+    std::lock_guard record_lock(record_mutex);
+    ++found_again;
+  }
+  found.reset();
 }
 
 Status Slam::Impl::failure_status() const {
@@ -232,6 +299,7 @@ Result<TrackResult> Slam::process_named(const RgbdFrame& frame, std::optional<Se
 }
 
 TrackResult Slam::Impl::track(const RgbdFrame& frame, const Segmentation* mask) {
+  resume_where_found();
   const bool may_request = !config.realtime || requests.size() < static_cast<std::size_t>(config.mapping_queue);
   Tracker::Output tracked = tracker.step(frame, mask, newest_map(), may_request);
   timers["tracking.extract"].add_ms(tracked.times.extract_ms);
@@ -257,10 +325,14 @@ TrackResult Slam::Impl::track(const RgbdFrame& frame, const Segmentation* mask) 
   {
     std::lock_guard lock(record_mutex);
     ++frames;
-    if (tracked.state == TrackingState::kLost) ++lost;
+    if (tracked.state == TrackingState::kLost)
+      ++lost, ++lost_in_a_row;
+    else
+      lost_in_a_row = 0;
     if (tracked.relative) records.push_back({frame.stamp, *tracked.relative});
     dynamic.add(*tracked.dynamic);
   }
+  if (tracked.search) submit(std::move(*tracked.search));
   for (const auto& sink : sinks) sink->on_frame(frame, result);
   return result;
 }
@@ -321,6 +393,7 @@ SlamStatistics Slam::statistics() const {
   statistics.lost = impl_->lost;
   statistics.key_frames = impl_->mapper.map().key_frames().size();
   statistics.landmarks = impl_->mapper.map().landmark_count();
+  statistics.relocalised = impl_->found_again;
   statistics.revisits = static_cast<std::uint64_t>(impl_->mapper.revisits());
   statistics.dynamic = impl_->dynamic;
   statistics.notices = impl_->notices;

@@ -54,7 +54,8 @@ struct DynamicTotals {
 struct SlamStatistics {
   std::uint64_t frames = 0, tracked = 0, lost = 0;
   std::uint64_t key_frames = 0, landmarks = 0;
-  std::uint64_t revisits = 0;  // times that drift since an earlier visit of a place was removed
+  std::uint64_t relocalised = 0;  // times that a lost camera was found in the map
+  std::uint64_t revisits = 0;     // times that drift since an earlier visit of a place was removed
   DynamicTotals dynamic;
   std::vector<std::string> notices;  // what went wrong without ending the run, each once
   std::vector<StageSummary> stages;

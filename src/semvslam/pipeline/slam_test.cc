@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "semvslam/geometry/alignment.h"
@@ -94,6 +96,48 @@ TEST_P(SlamTest, DarkFramesAreCountedLostAndTrackingComesBack) {
   EXPECT_EQ(slam->statistics().lost, 3u);
   EXPECT_EQ(slam->trajectory().size(), 17u);
   expect_truth(slam->trajectory());
+}
+
+TEST_P(SlamTest, ALostCameraIsFoundFarFromWhereItGotLost) {
+  // Along the wall, farther than an image is wide; then the camera is carried back with its eyes shut.
+  const auto at = [](int i) { return SE3(Eigen::Quaterniond::Identity(), {-1.2 + 0.06 * i, 0, 0}); };
+  constexpr int kWay = 40;
+  const auto slam = make_slam(world, GetParam());
+  for (int i = 0; i <= kWay; ++i) ASSERT_TRUE(slam->process(world.render(at(i), i)).ok());
+  RgbdFrame dark = world.render(at(kWay), kWay + 1);
+  dark.gray.setTo(0);
+  EXPECT_EQ(slam->process(dark)->state, TrackingState::kLost);
+  EXPECT_EQ(slam->process(world.render(at(1), kWay + 2))->state, TrackingState::kLost);  // and looked for
+  for (int i = 2; i < 8; ++i) {
+    const Result<TrackResult> result = slam->process(world.render(at(i), kWay + 1 + i));
+    ASSERT_TRUE(result.ok());
+    ASSERT_EQ(result->state, TrackingState::kTracking);
+    EXPECT_NEAR(result->world_from_camera.translation().x(), 0.06 * i, 0.01);
+  }
+  ASSERT_TRUE(slam->finish().ok());
+  EXPECT_EQ(slam->statistics().relocalised, 1u);
+  EXPECT_EQ(slam->statistics().lost, 2u);
+  EXPECT_TRUE(slam->check_invariants().ok());
+}
+
+TEST_P(SlamTest, ALostCameraThatIsNowhereStaysLostAndIsNotLookedForInEveryFrame) {
+  const auto slam = make_slam(world, GetParam());
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(slam->process(world.render(i)).ok());
+  RgbdFrame elsewhere = world.render(10);
+  cv::randu(elsewhere.gray, 0, 255);
+  cv::GaussianBlur(elsewhere.gray, elsewhere.gray, {}, 1.5);
+  cv::normalize(elsewhere.gray, elsewhere.gray, 0, 255, cv::NORM_MINMAX);
+  for (int i = 10; i < 30; ++i) {
+    elsewhere.stamp = TimeStamp{i * 33'333'333LL};
+    EXPECT_EQ(slam->process(elsewhere)->state, TrackingState::kLost);
+  }
+  ASSERT_TRUE(slam->finish().ok());
+  EXPECT_EQ(slam->statistics().relocalised, 0u);
+  const SlamStatistics statistics = slam->statistics();
+  const auto stage = std::find_if(statistics.stages.begin(), statistics.stages.end(),
+                                  [](const StageSummary& s) { return s.name == "mapping.relocalise"; });
+  ASSERT_NE(stage, statistics.stages.end());
+  EXPECT_EQ(stage->count, 8u);  // of 20: the first five, then every fifth
 }
 
 TEST_P(SlamTest, QueriesFromAnotherThreadSeeConsistentStates) {

@@ -7,6 +7,7 @@
 #include "semvslam/base/time_stamp.h"
 #include "semvslam/geometry/se3.h"
 #include "semvslam/map/frame_features.h"
+#include "semvslam/map/local_map.h"
 
 namespace semvslam {
 
@@ -30,10 +31,24 @@ struct KeyFrameRequest {
   std::vector<LandmarkUse> uses;      // since the previous request
 };
 
+/// A frame that got lost, to be looked for in the whole map.
+struct SearchRequest {
+  FrameId frame;
+  std::shared_ptr<FrameFeatures> features;
+};
+
 /// The pose of a frame relative to the key frame that it was tracked against.
 struct RelativePose {
   KeyFrameId reference;
   SE3 camera_from_reference;
+};
+
+/// Where the frame of a SearchRequest is.
+struct FoundAgain {
+  std::shared_ptr<FrameFeatures> features;  // of the request
+  std::vector<LandmarkId> landmarks;        // per feature; invalid = none
+  RelativePose relative;
+  std::shared_ptr<const LocalMap> local;  // around the key frame it was found at
 };
 
 }  // namespace semvslam

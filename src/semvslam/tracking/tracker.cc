@@ -17,6 +17,7 @@ double ms_since(Clock::time_point start) {
 
 constexpr double kNearestProjection = 0.05;             // metres before the camera
 constexpr double kLeastUsedShare = 0.5;                 // of the features: no more than twice as many are extracted
+constexpr std::size_t kLeastToSearch = 50;              // features by which a lost frame can be found
 constexpr double kMapJumpM = 0.01, kMapJumpRad = 0.01;  // more than a local bundle adjustment moves the newest frame
 
 }  // namespace
@@ -123,11 +124,25 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
     if (has_velocity_) velocity_ = current_.camera_from_world * last_.camera_from_world.inverse();
     if (may_request && wants_key_frame(output.inliers, frame.id)) output.key_frame = make_request(frame);
     last_ = std::move(current_);
+    lost_ = false;
   } else {
+    lost_ = true;
     output.state = TrackingState::kLost;
+    if (current_.features->size() >= kLeastToSearch) output.search = SearchRequest{frame.id, current_.features};
     output.camera_from_world = last_.camera_from_world;
     has_velocity_ = false;  // the last frame stays what the next one is matched against
   }
+}
+
+bool Tracker::resume(const FoundAgain& found) {
+  if (!lost_) return false;
+  const LocalMap::KeyFramePose& reference = *found.local->find(found.relative.reference);
+  last_ = {found.features, found.landmarks, found.relative.camera_from_reference * reference.camera_from_world};
+  last_relative_ = found.relative;
+  // A key frame is due here, and none is pending: those before were worked off before the search.
+  last_key_frame_ = found.local->reference_frame;
+  filter_.forget_poses();
+  return true;
 }
 
 void Tracker::initialise(const RgbdFrame& frame, Output& output) {

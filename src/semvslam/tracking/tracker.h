@@ -53,6 +53,7 @@ class Tracker {
     std::optional<RelativePose> relative;      // absent until the first key frame is in the map, and while lost
     int inliers = 0;                           // landmarks that agree with the pose
     std::optional<KeyFrameRequest> key_frame;  // present when this frame should be kept
+    std::optional<SearchRequest> search;       // present when it got lost and has features to be found by
     TrackingTimes times;
     std::shared_ptr<const DynamicRecord> dynamic;  // what was left out, and why
   };
@@ -65,6 +66,10 @@ class Tracker {
   /// @param may_request whether mapping would take a key frame now.
   Output step(const RgbdFrame& frame, const Segmentation* segmentation, std::shared_ptr<const LocalMap> local,
               bool may_request);
+
+  /// Goes on from where a lost frame was found; the next step() must get found.local, or a newer one. @return false
+  /// when tracking has found back by itself meanwhile: then nothing changes.
+  bool resume(const FoundAgain& found);
 
   /// Motion consistency from now on: there will be no masks any more.
   void use_motion() { filter_.use_motion(); }
@@ -111,7 +116,7 @@ class Tracker {
   std::shared_ptr<const LocalMap> local_;
   Tracked current_, last_;
   SE3 velocity_;  // current_from_last
-  bool has_velocity_ = false;
+  bool has_velocity_ = false, lost_ = false;
   std::optional<RelativePose> last_relative_;
   bool waiting_for_map_ = false;  // the first request was made
   FrameId last_key_frame_;

@@ -1,0 +1,142 @@
+#include "semvslam/mapping/relocalise.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "semvslam/feature/matching.h"
+#include "semvslam/map/landmark_view.h"
+#include "semvslam/solve/pnp.h"
+
+namespace semvslam {
+namespace {
+
+constexpr std::size_t kSample = 200;    // descriptors that all key frames are compared by
+constexpr std::size_t kLeastVotes = 6;  // of them in one key frame; chance gives one or two
+constexpr int kFirstNeighbours = 4;     // of a candidate, for a first pose: more would only be more to confuse
+constexpr int kLeastFirst = 12;         // landmarks that agree with it
+constexpr int kLeastShared = 15;        // landmarks that make key frames neighbours
+
+MatchOptions matching(const RelocaliseOptions& options) {
+  return {.max_distance = options.max_distance_bits, .ratio = 0.8f, .check_rotation = false};
+}
+
+/// Key frames by how many of the sample they hold, most first.
+std::vector<KeyFrameId> most_alike(const Map& map, const FrameFeatures& features, const RelocaliseOptions& options) {
+  std::vector<Descriptor> sample, seen;
+  const std::size_t step = std::max<std::size_t>(1, features.size() / kSample);
+  for (std::size_t i = 0; i < features.size(); i += step) sample.push_back(features.orb.descriptors[i]);
+  std::vector<std::pair<std::size_t, KeyFrameId>> votes;
+  std::vector<Match> matches;
+  for (const auto& [id, key_frame] : map.key_frames()) {
+    seen.clear();
+    for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
+      if (key_frame.landmarks[i].valid()) seen.push_back(key_frame.features->orb.descriptors[i]);
+    match_brute_force(sample, seen, matching(options), matches);
+    if (matches.size() >= kLeastVotes) votes.emplace_back(matches.size(), id);
+  }
+  std::sort(votes.rbegin(), votes.rend());  // of equal ones the newer first
+  std::vector<KeyFrameId> out;
+  for (const auto& [count, id] : votes) {
+    if (out.size() == static_cast<std::size_t>(options.candidates)) break;
+    out.push_back(id);
+  }
+  return out;
+}
+
+std::vector<LandmarkId> landmarks_around(const Map& map, KeyFrameId id, int neighbours) {
+  std::vector<KeyFrameId> key_frames{id};
+  for (const Covisible& c : map.covisible(id, kLeastShared)) {
+    if (key_frames.size() > static_cast<std::size_t>(neighbours)) break;
+    key_frames.push_back(c.key_frame);
+  }
+  return map.landmarks_of(key_frames);
+}
+
+struct Correspondences {
+  std::vector<LandmarkId> landmarks;
+  std::vector<std::uint32_t> features;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<PointObservation> observations;
+
+  /// @param sources the landmark of each query.
+  Correspondences(const Map& map, const FrameFeatures& frame, const std::vector<LandmarkId>& sources,
+                  const std::vector<Match>& matches) {
+    for (const Match& m : matches) {
+      landmarks.push_back(sources[static_cast<std::size_t>(m.query)]);
+      features.push_back(static_cast<std::uint32_t>(m.feature));
+      points.push_back(map.landmark(landmarks.back())->position);
+      observations.push_back(map.model().observation(frame, features.back()));
+    }
+  }
+};
+
+/// By descriptors alone.
+std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, KeyFrameId id,
+                              const RelocaliseOptions& options) {
+  const std::vector<LandmarkId> landmarks = landmarks_around(map, id, kFirstNeighbours);
+  std::vector<Descriptor> descriptors;
+  for (const LandmarkId l : landmarks) descriptors.push_back(map.landmark(l)->descriptor);
+  std::vector<Match> matches;
+  match_brute_force(descriptors, features.orb.descriptors, matching(options), matches);
+  const Correspondences pairs(map, features, landmarks, matches);
+  const Result<PnpEstimate> estimate =
+      estimate_pose(map.model().intrinsics(), pairs.points, pairs.observations,
+                    {.min_inliers = kLeastFirst, .refinement = {.chi2_disparity = map.model().chi2_disparity()}});
+  if (!estimate) return std::nullopt;
+  return estimate->pose.camera_from_world;
+}
+
+/// Searches everything that should be seen from there.
+std::optional<Relocalisation> confirm(const Map& map, const FrameFeatures& features, KeyFrameId id, const SE3& pose,
+                                      const RelocaliseOptions& options) {
+  const LandmarkViewer viewer(map.model(), pose);
+  std::vector<ProjectedQuery> queries;
+  std::vector<LandmarkId> sources;
+  for (const LandmarkId l : landmarks_around(map, id, options.neighbours)) {
+    const Landmark& landmark = *map.landmark(l);
+    const std::optional<LandmarkView> view =
+        viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
+    if (!view) continue;
+    queries.push_back(query_of(map.model(), *view, options.radius_px, landmark.descriptor));
+    sources.push_back(l);
+  }
+  std::vector<Match> matches;
+  match_projected(queries, features.orb, features.grid, matching(options), matches);
+  const Correspondences pairs(map, features, sources, matches);
+  std::vector<std::uint8_t> inlier;
+  const PoseEstimate estimate = optimize_pose(map.model().intrinsics(), pose, pairs.points, pairs.observations,
+                                              {.chi2_disparity = map.model().chi2_disparity()}, inlier);
+  if (estimate.inliers < options.min_inliers ||
+      estimate.inliers < options.min_share * static_cast<double>(matches.size()))
+    return std::nullopt;
+  Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers};
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (inlier[i]) found.landmarks[pairs.features[i]] = pairs.landmarks[i];
+  return found;
+}
+
+}  // namespace
+
+void RelocaliseOptions::add_to(ConfigSchema& s) {
+  s.add("mapping.relocalise.enabled", &enabled, "a frame that got lost is looked for in the whole map");
+  s.add("mapping.relocalise.candidates", &candidates, {1, 1000},
+        "key frames that look most like it, tried one after the other");
+  s.add("mapping.relocalise.max_distance_bits", &max_distance_bits, {1, 256},
+        "descriptors that differ in more bits are no match");
+  s.add("mapping.relocalise.radius_px", &radius_px, {0.5, 100},
+        "search window at level 0 once there is a first pose, px");
+  s.add("mapping.relocalise.neighbours", &neighbours, {0, 1000},
+        "neighbours of the key frame, whose landmarks are searched then");
+  s.add("mapping.relocalise.min_inliers", &min_inliers, {6, 10000}, "landmarks that must agree with the pose");
+  s.add("mapping.relocalise.min_share", &min_share, {0, 1}, "share of the landmarks found that must agree");
+}
+
+std::optional<Relocalisation> relocalise(const Map& map, const FrameFeatures& features,
+                                         const RelocaliseOptions& options) {
+  for (const KeyFrameId id : most_alike(map, features, options))
+    if (const std::optional<SE3> pose = first_pose(map, features, id, options))
+      if (std::optional<Relocalisation> found = confirm(map, features, id, *pose, options)) return found;
+  return std::nullopt;
+}
+
+}  // namespace semvslam
