@@ -167,6 +167,29 @@ TEST_P(SlamTest, ItCanBeDroppedAtAnyMomentAndFinishedTwice) {
 INSTANTIATE_TEST_SUITE_P(Schedulers, SlamTest, ::testing::Bool(),
                          [](const auto& scheduler) { return scheduler.param ? "deterministic" : "threaded"; });
 
+TEST(Slam, InRealTimeALostCameraIsFoundByALaterFrame) {
+  const PlaneWorld world;
+  const auto at = [](int i) { return SE3(Eigen::Quaterniond::Identity(), {-1.2 + 0.06 * i, 0, 0}); };
+  Config config;
+  config.realtime = true;
+  const auto slam = std::move(Slam::create(config, world.camera())).value();
+  int stamp = 0;
+  // Nothing waits for mapping here: four frames to a step, so that the map gets there.
+  for (int i = 0; i <= 4 * 40; ++i) ASSERT_TRUE(slam->process(world.render(at(i / 4), stamp++)).ok());
+  TrackingState state = TrackingState::kLost;
+  for (int i = 0; i < 500 && state != TrackingState::kTracking; ++i) {
+    const Result<TrackResult> result = slam->process(world.render(at(1), stamp++));
+    ASSERT_TRUE(result.ok());
+    state = result->state;
+    if (state == TrackingState::kTracking) {
+      EXPECT_NEAR(result->world_from_camera.translation().x(), 0.06, 0.03);
+    }
+  }
+  EXPECT_EQ(state, TrackingState::kTracking);
+  ASSERT_TRUE(slam->finish().ok());
+  EXPECT_GE(slam->statistics().relocalised, 1u);
+}
+
 TEST(Slam, DeterministicRunsAreByteIdentical) {
   const PlaneWorld world;
   std::vector<std::vector<Eigen::Vector3d>> landmarks;
