@@ -40,7 +40,9 @@ struct MovingRegionOptions {
   int min_tracks = 3;       // moving tracks (and depth seeds) that make a new region
   double cluster_px = 60;   // tracks farther apart in the image ...
   double cluster_m = 0.35;  // ... or in space are in different regions
-  double margin_px = 25;    // a region may reach that far from its tracks
+  /// A region may reach that far from its tracks: half a cell of FlowTrackOptions, over which tracks are spread.
+  /// Farther, it takes the static surface beside a thing along with it.
+  double margin_px = 20;
   double hold_s = 1.0;      // it is kept for that long after it stopped
   bool depth_seeds = true;  // use surfaces nearer than predicted as further evidence
   int seed_step_px = 8;     // raster on which they are looked for

@@ -17,7 +17,7 @@ struct GrowthSeed {
 };
 
 struct GrowthLimits {
-  double margin_px = 25;      // about each seed
+  double margin_px = 20;      // about each seed
   double bridge_px = 60;      // seeds as near as that are one area with what lies between them
   double reach_m = 0.35;      // in depth, from the seed that a place was reached from
   double step_share = 0.025;  // of the depth: a larger step between neighbours is an edge
