@@ -77,7 +77,7 @@ class RoomWithPeople : public testing::Test {
     options.people = people;
     options.frames = 10;
     options.frame_rate_hz = 2;
-    options.width_px = 320, options.height_px = 240;
+    options.width_px = 240, options.height_px = 180;
     options.noise = false;
     Result<RenderedScene> scene = RenderedScene::create(options);
     if (!scene) throw std::runtime_error(scene.error().message);
