@@ -175,7 +175,7 @@ void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3
   const std::uint8_t* pixels = picture.data;
   const std::size_t pixel_step = picture.step[0];
   const int channels = picture.channels();
-  fresh_.clear();
+  std::vector<Voxel> fresh;
   for (int y = 0; y < depth_m.rows; ++y) {
     const float* depth = depth_m.ptr<float>(y);
     for (int x = 0; x < depth_m.cols; ++x) {
@@ -191,15 +191,15 @@ void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3
       const std::uint8_t* bgr = pixels + static_cast<std::size_t>(y) * pixel_step + x * channels;
       const Eigen::Vector3f colour(bgr[0], bgr[channels / 2], bgr[channels - 1]);
       const Eigen::Vector3f within = (p - cell.matrix() * options_.voxel_m).cast<float>();
-      if (!fresh_.empty() && fresh_.back().place == place)  // as the pixel beside it: half of the sorting saved
-        fresh_.back().add({place, within, colour, 1, 0});
+      if (!fresh.empty() && fresh.back().place == place)  // as the pixel beside it: half of the sorting saved
+        fresh.back().add({place, within, colour, 1, 0});
       else
-        fresh_.push_back({place, within, colour, 1, 1});
+        fresh.push_back({place, within, colour, 1, 1});
     }
   }
-  reduce(fresh_);
-  for (Voxel& v : fresh_) v.frames = 1;  // its pixels are of one frame
-  pending_.insert(pending_.end(), fresh_.begin(), fresh_.end());
+  reduce(fresh);
+  for (Voxel& v : fresh) v.frames = 1;  // its pixels are of one frame
+  pending_.insert(pending_.end(), fresh.begin(), fresh.end());
   // Merged when as many wait as there are: each voxel is moved a few times only, however many frames come.
   if (pending_.size() > std::max(kLeastPending, voxels_.size())) merge();
 }

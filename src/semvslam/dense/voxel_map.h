@@ -77,9 +77,9 @@ class VoxelMap {
 
   Camera camera_;
   DenseOptions options_;
-  std::vector<Eigen::Vector2f> rays_;            // per recorded pixel: x / z and y / z
-  std::vector<int> block_of_pixel_;              // of View::free_m; -1 = none
-  std::vector<Voxel> voxels_, fresh_, pending_;  // sorted by place; of the last frame, unsorted; of several frames
+  std::vector<Eigen::Vector2f> rays_;    // per recorded pixel: x / z and y / z
+  std::vector<int> block_of_pixel_;      // of View::free_m; -1 = none
+  std::vector<Voxel> voxels_, pending_;  // sorted by place; of frames not yet merged into them
   std::vector<View> views_;
 };
 

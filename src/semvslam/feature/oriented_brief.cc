@@ -18,7 +18,6 @@ namespace semvslam {
 namespace {
 
 constexpr float kTurn = 2 * std::numbers::pi_v<float>;
-constexpr std::size_t kTests = 256;
 constexpr int kColumns = 32;  // of the patch and one more, a whole vector
 
 /// Vectors of the compiler (GCC, clang): they become whatever registers the target has, with one result on all of them.
@@ -115,9 +114,9 @@ Descriptor OrientedBrief::describe(const std::uint8_t* centre, float angle_rad) 
   const std::int32_t* offset = offsets_.data() + step * kPoints;
   // All are fetched, then compared at once: half of the instructions of test after test. A vector that is read across
   // bytes just written waits until they are done: by then they are.
-  alignas(64) std::array<std::uint8_t, kTests> a, b;
+  alignas(64) std::array<std::uint8_t, kPoints / 2> a, b;
 #pragma GCC unroll 8
-  for (std::size_t i = 0; i < kTests; ++i) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
     a[i] = centre[offset[2 * i]];
     b[i] = centre[offset[2 * i + 1]];
   }

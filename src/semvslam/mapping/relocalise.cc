@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "semvslam/feature/matching.h"
-#include "semvslam/map/landmark_view.h"
+#include "semvslam/mapping/landmark_search.h"
 #include "semvslam/solve/pnp.h"
 
 namespace semvslam {
@@ -52,24 +51,6 @@ std::vector<LandmarkId> landmarks_around(const Map& map, KeyFrameId id, int neig
   return map.landmarks_of(key_frames);
 }
 
-struct Correspondences {
-  std::vector<LandmarkId> landmarks;
-  std::vector<std::uint32_t> features;
-  std::vector<Eigen::Vector3d> points;
-  std::vector<PointObservation> observations;
-
-  /// @param sources the landmark of each query.
-  Correspondences(const Map& map, const FrameFeatures& frame, const std::vector<LandmarkId>& sources,
-                  const std::vector<Match>& matches) {
-    for (const Match& m : matches) {
-      landmarks.push_back(sources[static_cast<std::size_t>(m.query)]);
-      features.push_back(static_cast<std::uint32_t>(m.feature));
-      points.push_back(map.landmark(landmarks.back())->position);
-      observations.push_back(map.model().observation(frame, features.back()));
-    }
-  }
-};
-
 /// By descriptors alone.
 std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, KeyFrameId id,
                               const RelocaliseOptions& options) {
@@ -78,7 +59,7 @@ std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, Key
   for (const LandmarkId l : landmarks) descriptors.push_back(map.landmark(l)->descriptor);
   std::vector<Match> matches;
   match_brute_force(descriptors, features.orb.descriptors, matching(options), matches);
-  const Correspondences pairs(map, features, landmarks, matches);
+  const LandmarkMatches pairs = pair_up(map, features, landmarks, matches);
   const Result<PnpEstimate> estimate =
       estimate_pose(map.model().intrinsics(), pairs.points, pairs.observations,
                     {.min_inliers = kLeastFirst, .refinement = {.chi2_disparity = map.model().chi2_disparity()}});
@@ -89,28 +70,16 @@ std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, Key
 /// Searches everything that should be seen from there.
 std::optional<Relocalisation> confirm(const Map& map, const FrameFeatures& features, KeyFrameId id, const SE3& pose,
                                       const RelocaliseOptions& options) {
-  const LandmarkViewer viewer(map.model(), pose);
-  std::vector<ProjectedQuery> queries;
-  std::vector<LandmarkId> sources;
-  for (const LandmarkId l : landmarks_around(map, id, options.neighbours)) {
-    const Landmark& landmark = *map.landmark(l);
-    const std::optional<LandmarkView> view =
-        viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
-    if (!view) continue;
-    queries.push_back(query_of(map.model(), *view, options.radius_px, landmark.descriptor));
-    sources.push_back(l);
-  }
-  std::vector<Match> matches;
-  match_projected(queries, features.orb, features.grid, matching(options), matches);
-  const Correspondences pairs(map, features, sources, matches);
+  const LandmarkMatches pairs = search_landmarks(map, features, pose, landmarks_around(map, id, options.neighbours),
+                                                 options.radius_px, matching(options));
   std::vector<std::uint8_t> inlier;
   const PoseEstimate estimate = optimize_pose(map.model().intrinsics(), pose, pairs.points, pairs.observations,
                                               {.chi2_disparity = map.model().chi2_disparity()}, inlier);
   if (estimate.inliers < options.min_inliers ||
-      estimate.inliers < options.min_share * static_cast<double>(matches.size()))
+      estimate.inliers < options.min_share * static_cast<double>(pairs.size()))
     return std::nullopt;
   Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers};
-  for (std::size_t i = 0; i < matches.size(); ++i)
+  for (std::size_t i = 0; i < pairs.size(); ++i)
     if (inlier[i]) found.landmarks[pairs.features[i]] = pairs.landmarks[i];
   return found;
 }

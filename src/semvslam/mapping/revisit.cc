@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "semvslam/feature/matching.h"
-#include "semvslam/map/landmark_view.h"
+#include "semvslam/mapping/landmark_search.h"
 #include "semvslam/solve/pnp.h"
 #include "semvslam/solve/pose_graph.h"
 
@@ -97,40 +96,20 @@ std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const Revisit
   const std::vector<KeyFrameId> earlier = earlier_key_frames(map, id, first_recent->first, options);
   if (earlier.empty()) return std::nullopt;
 
-  const LandmarkViewer viewer(map.model(), key_frame.camera_from_world);
-  std::vector<ProjectedQuery> queries;
-  std::vector<LandmarkId> sources;
-  for (const LandmarkId l : map.landmarks_of(earlier)) {
-    const Landmark& landmark = *map.landmark(l);
-    if (landmark.observations.back().key_frame >= first_recent->first) continue;
-    const std::optional<LandmarkView> view =
-        viewer.view({landmark.position, landmark.normal, landmark.min_distance_m, landmark.max_distance_m});
-    if (!view) continue;
-    queries.push_back(query_of(map.model(), *view, options.radius_px, landmark.descriptor));
-    sources.push_back(l);
-  }
-  if (queries.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
-  std::vector<Match> matches;
-  match_projected(queries, key_frame.features->orb, key_frame.features->grid,
-                  {.max_distance = 50, .ratio = 0.8f, .check_rotation = false}, matches);
-  if (matches.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
-
-  std::vector<Eigen::Vector3d> points;
-  std::vector<PointObservation> observations;
-  for (const Match& m : matches) {
-    points.push_back(map.landmark(sources[static_cast<std::size_t>(m.query)])->position);
-    observations.push_back(map.model().observation(*key_frame.features, static_cast<std::size_t>(m.feature)));
-  }
+  std::vector<LandmarkId> landmarks = map.landmarks_of(earlier);
+  std::erase_if(landmarks,
+                [&](LandmarkId l) { return map.landmark(l)->observations.back().key_frame >= first_recent->first; });
+  const LandmarkMatches pairs =
+      search_landmarks(map, *key_frame.features, key_frame.camera_from_world, landmarks, options.radius_px,
+                       {.max_distance = 50, .ratio = 0.8f, .check_rotation = false});
+  if (pairs.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
   const Result<PnpEstimate> estimate = estimate_pose(
-      map.model().intrinsics(), points, observations,
+      map.model().intrinsics(), pairs.points, pairs.observations,
       {.min_inliers = options.min_inliers, .refinement = {.chi2_disparity = map.model().chi2_disparity()}});
-  if (!estimate || estimate->pose.inliers < options.min_share * static_cast<double>(matches.size()))
-    return std::nullopt;
+  if (!estimate || estimate->pose.inliers < options.min_share * static_cast<double>(pairs.size())) return std::nullopt;
   Revisit revisit{earlier.front(), estimate->pose.camera_from_world, {}, 0};
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (estimate->inlier[i])
-      revisit.matches.emplace_back(sources[static_cast<std::size_t>(matches[i].query)],
-                                   static_cast<std::uint32_t>(matches[i].feature));
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (estimate->inlier[i]) revisit.matches.emplace_back(pairs.landmarks[i], pairs.features[i]);
   if (revisit.matches.empty()) return std::nullopt;
   revisit.shift_px = median_shift_px(map, revisit, key_frame.camera_from_world);
   if (revisit.shift_px < options.least_shift_px) return std::nullopt;

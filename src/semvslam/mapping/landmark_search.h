@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "semvslam/feature/matching.h"
+#include "semvslam/map/map.h"
+
+namespace semvslam {
+
+/// Landmarks and the features of a frame that they were matched to, as the pose solvers want them.
+struct LandmarkMatches {
+  std::vector<LandmarkId> landmarks;
+  std::vector<std::uint32_t> features;
+  std::vector<Eigen::Vector3d> points;  // world, metres
+  std::vector<PointObservation> observations;
+
+  std::size_t size() const { return landmarks.size(); }
+};
+
+/// @param sources the landmark of each query.
+LandmarkMatches pair_up(const Map& map, const FrameFeatures& frame, const std::vector<LandmarkId>& sources,
+                        const std::vector<Match>& matches);
+
+/// Searches landmarks where a camera at that pose should see them. @param radius_px at level 0.
+LandmarkMatches search_landmarks(const Map& map, const FrameFeatures& frame, const SE3& camera_from_world,
+                                 const std::vector<LandmarkId>& landmarks, double radius_px,
+                                 const MatchOptions& options);
+
+}  // namespace semvslam
