@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the shape of the source tree: which module may use which, where foreign libraries may appear, how long files are.
+"""Checks the shape of the source tree: which module may use which, where foreign libraries may appear, how long files are,
+and that no two tests can share a temporary folder.
 
   check_layers.py [ROOT]     exit code 1 and one line per fault
 
@@ -49,6 +50,9 @@ TEST_ONLY_MODULES = {"render", "data"}  # any test may use these to make its inp
 
 MAX_FILE_LINES = 500
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
+# Tests run beside each other. Names chosen by hand met once: two tests of one fixture, one folder.
+TEMPORARY_FOLDER = "base/temporary_folder_test_support.h"
+NAMED_BY_HAND = re.compile(r"\b(TempDir|temp_directory_path)\s*\(|\"/tmp/")
 MODULE_CALL = re.compile(r"semvslam_module\s*\(\s*(\w+)([^)]*)\)", re.DOTALL)
 
 
@@ -68,6 +72,8 @@ def check_source(path, module, root, faults):
     if len(lines) > MAX_FILE_LINES:
         faults.append(f"{name}: {len(lines)} lines; split it by subject, {MAX_FILE_LINES} are the limit")
     for number, line in enumerate(lines, 1):
+        if test and NAMED_BY_HAND.search(line) and not path.match(TEMPORARY_FOLDER):
+            faults.append(f"{name}:{number}: use TemporaryFolder of semvslam/{TEMPORARY_FOLDER}; tests share no folder")
         match = INCLUDE.match(line)
         if not match:
             continue

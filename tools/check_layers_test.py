@@ -55,6 +55,11 @@ class CheckLayersTest(unittest.TestCase):
         self.assertEqual([], self.faults_of({"base/a.cc": "//\n" * 500}))
         self.assertIn("unknown module", self.faults_of({"misc/a.cc": ""})[0])
 
+    def test_temporary_folders_have_no_names_of_their_own(self):
+        self.assertIn("TemporaryFolder", self.faults_of({"map/a_test.cc": 'auto f = fs::path(testing::TempDir()) / "mine";\n'})[0])
+        self.assertEqual(1, len(self.faults_of({"map/a_test.cc": 'auto f = fs::temp_directory_path();\n'})))
+        self.assertEqual([], self.faults_of({"base/temporary_folder_test_support.h": "fs::temp_directory_path();\n"}))
+
     def test_circle_in_the_table_is_found(self):
         saved = check_layers.ALLOWED
         try:

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "semvslam/apps/render_scene.h"
+#include "semvslam/base/temporary_folder_test_support.h"
 
 namespace semvslam {
 namespace {
@@ -17,8 +18,6 @@ namespace fs = std::filesystem;
 class DenseMapTest : public testing::Test {
  protected:
   void SetUp() override {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     SceneOptions scene;
     scene.people = "none";
     scene.motion = "xyz";
@@ -29,13 +28,12 @@ class DenseMapTest : public testing::Test {
     ASSERT_TRUE(truth) << truth.error().message;
     poses_ = *truth;
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   Result<DenseMapSummary> make(const fs::path& file, const Trajectory& poses) const {
     return make_dense_map(folder_ / "room", {}, poses, {}, {}, file);
   }
 
-  fs::path folder_ = fs::path(testing::TempDir()) / "semvslam_dense_map";
+  const testing_support::TemporaryFolder folder_;
   Trajectory poses_;
 };
 

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -14,32 +16,27 @@ namespace fs = std::filesystem;
 
 class RunOutputTest : public ::testing::Test {
  protected:
-  RunOutputTest()
-      : folder_(fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name()) {
-    fs::remove_all(folder_);
-  }
-  ~RunOutputTest() override { fs::remove_all(folder_); }
-
   std::string content(const std::string& name) const {
-    std::ifstream file(folder_ / name, std::ios::binary);
+    std::ifstream file(out_ / name, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};
   }
   static StampedPose pose(double seconds, double x) {
     return {TimeStamp::from_seconds(seconds), SE3(Eigen::Quaterniond::Identity(), {x, 0, 0})};
   }
 
-  const fs::path folder_;
+  const testing_support::TemporaryFolder folder_;
+  const fs::path out_ = folder_ / "out";
 };
 
 TEST_F(RunOutputTest, PosesAreInTheFileBeforeTheEnd) {
-  auto output = RunOutput::create(folder_ / "deeper");
+  auto output = RunOutput::create(out_ / "deeper");
   ASSERT_TRUE(output);
   ASSERT_TRUE(output->add_pose(pose(1, 2)));
   EXPECT_THAT(content("deeper/trajectory.txt"), ::testing::HasSubstr("1.000000000 2.000000000"));
 }
 
 TEST_F(RunOutputTest, ResultsReplaceThePosesAsTracked) {
-  auto output = RunOutput::create(folder_);
+  auto output = RunOutput::create(out_);
   ASSERT_TRUE(output);
   ASSERT_TRUE(output->add_pose(pose(1, 2)));
   const std::vector<Eigen::Vector3d> points = {{1, 2, 3}, {4, 5, 6}};
@@ -50,24 +47,24 @@ TEST_F(RunOutputTest, ResultsReplaceThePosesAsTracked) {
 }
 
 TEST_F(RunOutputTest, EarlierResultsAreRemoved) {
-  fs::create_directories(folder_);
-  std::ofstream(folder_ / "stats.json") << "old";
-  std::ofstream(folder_ / "mine.txt") << "kept";
-  ASSERT_TRUE(RunOutput::create(folder_));
-  EXPECT_FALSE(fs::exists(folder_ / "stats.json"));
-  EXPECT_TRUE(fs::exists(folder_ / "mine.txt"));
+  fs::create_directories(out_);
+  std::ofstream(out_ / "stats.json") << "old";
+  std::ofstream(out_ / "mine.txt") << "kept";
+  ASSERT_TRUE(RunOutput::create(out_));
+  EXPECT_FALSE(fs::exists(out_ / "stats.json"));
+  EXPECT_TRUE(fs::exists(out_ / "mine.txt"));
 }
 
 TEST_F(RunOutputTest, AFileInPlaceOfTheFolderIsAnError) {
-  std::ofstream(folder_) << "a file";
-  const auto output = RunOutput::create(folder_);
+  std::ofstream(out_) << "a file";
+  const auto output = RunOutput::create(out_);
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().code, ErrorCode::kIo);
-  EXPECT_THAT(output.error().message, ::testing::HasSubstr(folder_.string()));
+  EXPECT_THAT(output.error().message, ::testing::HasSubstr(out_.string()));
 }
 
 TEST_F(RunOutputTest, LogLinesCarryLevelAndMessage) {
-  auto output = RunOutput::create(folder_);
+  auto output = RunOutput::create(out_);
   ASSERT_TRUE(output);
   output->log("warning", "skipped: x");
   EXPECT_THAT(content("run.log"), ::testing::ContainsRegex("^[0-9-]+ [0-9:.]+ warning skipped: x\n$"));

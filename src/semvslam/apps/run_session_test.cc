@@ -10,6 +10,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -72,11 +74,9 @@ class WallSource final : public FrameSource {
 class RunSessionTest : public ::testing::Test {
  protected:
   RunSessionTest() {
-    options_.out = fs::path(::testing::TempDir()) / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    options_.out = folder_ / "run";
     options_.quiet = true;
-    fs::remove_all(options_.out);
   }
-  ~RunSessionTest() override { fs::remove_all(options_.out); }
 
   RunOutcome run(const WallSource::Plan& plan) {
     Config config;
@@ -89,6 +89,7 @@ class RunSessionTest : public ::testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
+  const testing_support::TemporaryFolder folder_;
   RunOptions options_;
 };
 

@@ -6,6 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -19,11 +21,7 @@ const cv::Size kSize(320, 240);
 /// A folder with one true mask, of the frame at 1 s: the rectangle moves.
 class TruthMasks : public testing::Test {
  protected:
-  void SetUp() override {
-    fs::create_directories(folder_);
-    cv::imwrite((folder_ / "1.000000.png").string(), filled(moving_));
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  void SetUp() override { cv::imwrite((folder_ / "1.000000.png").string(), filled(moving_)); }
 
   static cv::Mat filled(const cv::Rect& rect) {
     cv::Mat mask = cv::Mat::zeros(kSize, CV_8UC1);
@@ -34,7 +32,7 @@ class TruthMasks : public testing::Test {
   /// What is counted when the policy masks the rectangle (its outline moved outwards, as it does) and marks the
   /// features.
   TruthCounts counts_of(const cv::Rect& masked, std::vector<FeatureMark> features) const {
-    auto sink = TruthMaskSink::open(folder_, OrbOptions{}, kOutlinePx);
+    auto sink = TruthMaskSink::open(folder_.path(), OrbOptions{}, kOutlinePx);
     if (!sink) throw std::runtime_error(sink.error().message);
     auto record = std::make_shared<DynamicRecord>();
     if (!masked.empty()) {
@@ -51,7 +49,7 @@ class TruthMasks : public testing::Test {
     return (*sink)->counts();
   }
 
-  fs::path folder_ = fs::path(testing::TempDir()) / "semvslam_truth_masks";
+  const testing_support::TemporaryFolder folder_;
   cv::Rect moving_{100, 60, 80, 100};
 };
 

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -51,8 +53,7 @@ TEST(PointCloud, NoPointsAreAFileToo) {
 }
 
 TEST(PointCloud, TheNameSaysTheFormat) {
-  const fs::path folder = fs::path(testing::TempDir()) / "semvslam_point_cloud";
-  fs::create_directories(folder);
+  const testing_support::TemporaryFolder folder;
   for (const char* name : {"a.ply", "a.pcd"}) {
     ASSERT_TRUE(write_cloud(folder / name, kPoints));
     std::ifstream in(folder / name, std::ios::binary);
@@ -62,8 +63,7 @@ TEST(PointCloud, TheNameSaysTheFormat) {
   const Status other = write_cloud(folder / "a.xyz", kPoints);
   ASSERT_FALSE(other);
   EXPECT_THAT(other.error().message, HasSubstr(".ply or .pcd"));
-  EXPECT_FALSE(write_cloud(folder / "absent" / "a.ply", kPoints));
-  fs::remove_all(folder);
+  EXPECT_FALSE(write_cloud(folder / "absent/a.ply", kPoints));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
 #include "semvslam/pipeline/slam.h"
 #include "semvslam/tracking/plane_world_testing.h"
 
@@ -27,10 +28,6 @@ class DynamicSlamTest : public ::testing::Test {
   void SetUp() override {
     // The threads under test are ours. The thread sanitizer does not see how OpenCV's hand memory back.
     cv::setNumThreads(1);
-    folder = std::filesystem::path(::testing::TempDir()) /
-             ("masks_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directories(folder);
     for (int i = 0; i < kFrames; ++i) {
       cv::Mat mask = cv::Mat::zeros(240, 320, CV_8UC1);
       mask(cv::Rect(60 + i, 60, 60, 120)).setTo(1);
@@ -39,9 +36,8 @@ class DynamicSlamTest : public ::testing::Test {
     config.deterministic = true;
     EXPECT_TRUE(config.apply_mode("masks"));
     config.segment.source = "folder";
-    config.segment.mask_folder = folder.string();
+    config.segment.mask_folder = folder.path().string();
   }
-  void TearDown() override { std::filesystem::remove_all(folder); }
 
   std::filesystem::path file(int frame) const {
     char name[32];
@@ -65,7 +61,7 @@ class DynamicSlamTest : public ::testing::Test {
 
   static constexpr int kFrames = 12;
   PlaneWorld world;
-  std::filesystem::path folder;
+  const testing_support::TemporaryFolder folder;
   Config config;
   std::unique_ptr<Slam> slam;
   std::shared_ptr<NoticeCollector> notices = std::make_shared<NoticeCollector>();
@@ -132,7 +128,7 @@ TEST_F(DynamicSlamTest, RealtimeNeverWaitsAndStillUsesMasks) {
   config.realtime = true;
   EXPECT_TRUE(config.apply_mode("full"));
   config.segment.source = "folder";
-  config.segment.mask_folder = folder.string();
+  config.segment.mask_folder = folder.path().string();
   run();
   EXPECT_TRUE(notices->lines.empty());
 }

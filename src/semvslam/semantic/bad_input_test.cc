@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
 #include "semvslam/semantic/network_graphs.h"
 #include "semvslam/semantic/segmentation_files.h"
 #include "semvslam/semantic/segmenter.h"
@@ -21,12 +22,6 @@ const fs::path kModels = fs::path(SEMVSLAM_SOURCE_DIR) / "models";
 
 class BadInput : public ::testing::TestWithParam<std::string> {
  protected:
-  BadInput() {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~BadInput() override { fs::remove_all(folder_); }
-
   /// A copy of the shipped network to be damaged.
   void copy_model() const {
     for (const char* name : {"model.json", "trunk.onnx", "box.onnx", "mask.onnx", "trunk.int8.xml", "trunk.int8.bin"})
@@ -45,7 +40,7 @@ class BadInput : public ::testing::TestWithParam<std::string> {
     options.precision = precision;
     return make_segmenter(options, RoleTable());
   }
-  const fs::path folder_ = fs::temp_directory_path() / ("bad_input_" + std::to_string(::getpid()));
+  const testing_support::TemporaryFolder folder_;
 };
 
 TEST_P(BadInput, AModelThatIsMissingOrCutOffIsNamed) {
@@ -55,19 +50,19 @@ TEST_P(BadInput, AModelThatIsMissingOrCutOffIsNamed) {
   for (const auto& [graph, bytes] : cuts) {
     copy_model();
     fs::resize_file(folder_ / graph, bytes);
-    const auto cut = make(folder_);
+    const auto cut = make(folder_.path());
     ASSERT_FALSE(cut) << graph << " of " << bytes << " bytes";
     EXPECT_THAT(cut.error().message, HasSubstr(graph));
   }
   if (GetParam() == "openvino") {
     copy_model();
     fs::resize_file(folder_ / "trunk.int8.xml", 1000);
-    const auto cut = make(folder_, "int8");
+    const auto cut = make(folder_.path(), "int8");
     ASSERT_FALSE(cut);
     EXPECT_THAT(cut.error().message, HasSubstr("trunk.int8.xml"));
   }
   fs::remove(folder_ / "box.onnx");
-  const auto missing = make(folder_);
+  const auto missing = make(folder_.path());
   ASSERT_FALSE(missing);
   EXPECT_THAT(missing.error().message, AllOf(HasSubstr("model.json"), HasSubstr("box.onnx")));
 }
@@ -76,11 +71,11 @@ TEST_P(BadInput, AGraphOfAnotherShapeIsNamedWithItsTensor) {
   if (GetParam() == "openvino" && !have_openvino()) GTEST_SKIP() << "built without OpenVINO";
   copy_model();
   edit_model([](nlohmann::json& m) { m["feature_channels"] = 64; });
-  const auto thinner = make(folder_);
+  const auto thinner = make(folder_.path());
   ASSERT_FALSE(thinner);
   EXPECT_THAT(thinner.error().message, HasSubstr("'p3'"));
   edit_model([](nlohmann::json& m) { m["classes"] = {"person", "cup"}; });
-  const auto fewer = make(folder_);
+  const auto fewer = make(folder_.path());
   ASSERT_FALSE(fewer);
   EXPECT_THAT(fewer.error().message, HasSubstr("'probabilities'"));
 }
@@ -107,7 +102,8 @@ INSTANTIATE_TEST_SUITE_P(Backends, BadInput, ::testing::Values("openvino", "open
                          [](const auto& about) { return about.param; });
 
 TEST(ReadPicture, FilesThatAreNoPictureAreNamed) {
-  const fs::path file = fs::temp_directory_path() / ("picture_" + std::to_string(::getpid()) + ".png");
+  const testing_support::TemporaryFolder folder;
+  const fs::path file = folder / "picture.png";
   const auto refused = [&] {
     const Result<cv::Mat> picture = read_picture(file);
     return !picture && picture.error().message.find(file.filename().string()) != std::string::npos;
@@ -121,18 +117,17 @@ TEST(ReadPicture, FilesThatAreNoPictureAreNamed) {
   cv::imencode(".png", cv::Mat(40, 40, CV_8UC3, cv::Scalar::all(99)), bytes);
   std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), 40);  // the header only
   EXPECT_TRUE(refused());
-  fs::remove(file);
 }
 
 TEST(ReadPicture, EveryUsualTypeBecomesColour) {
-  const fs::path file = fs::temp_directory_path() / ("picture_" + std::to_string(::getpid()) + ".png");
+  const testing_support::TemporaryFolder folder;
+  const fs::path file = folder / "picture.png";
   for (const int type : {CV_8UC1, CV_16UC1, CV_8UC3, CV_16UC3, CV_8UC4}) {
     cv::imwrite(file.string(), cv::Mat(6, 9, type, cv::Scalar::all(CV_MAT_DEPTH(type) == CV_16U ? 50 * 256 : 50)));
     const Result<cv::Mat> picture = read_picture(file);
     ASSERT_TRUE(picture) << picture.error().message;
     EXPECT_EQ(cv::norm(*picture, cv::Mat(6, 9, CV_8UC3, cv::Scalar::all(50)), cv::NORM_INF), 0) << type;
   }
-  fs::remove(file);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
 #include "semvslam/semantic/segmentation_files.h"
 
 namespace semvslam {
@@ -16,7 +17,6 @@ using ::testing::HasSubstr;
 class FolderSegmenterTest : public ::testing::Test {
  protected:
   FolderSegmenterTest() {
-    fs::remove_all(folder_);
     fs::create_directories(folder_ / "mask");
     cv::Mat mask = cv::Mat::zeros(10, 20, CV_8UC1);
     mask(cv::Rect(3, 2, 4, 5)) = 1;
@@ -24,11 +24,10 @@ class FolderSegmenterTest : public ::testing::Test {
     cv::imwrite((folder_ / "mask" / "12.500000.png").string(), mask);
     std::ofstream(folder_ / "roles.json") << R"([{"number": 1, "label": "person"}, {"number": 2, "label": "cup"}])";
   }
-  ~FolderSegmenterTest() override { fs::remove_all(folder_); }
   SegmentationRequest request(double stamp_s, cv::Size size = {20, 10}) const {
     return {FrameId(7), TimeStamp::from_seconds(stamp_s), cv::Mat(size, CV_8UC3, cv::Scalar::all(0)), ""};
   }
-  const fs::path folder_ = fs::temp_directory_path() / ("folder_segmenter_" + std::to_string(::getpid()));
+  const testing_support::TemporaryFolder folder_;
 };
 
 TEST_F(FolderSegmenterTest, FindsTheMaskByStampAndNamesItsClasses) {
@@ -65,7 +64,7 @@ TEST_F(FolderSegmenterTest, DamagedFilesAndMissingFoldersAreErrors) {
   std::ofstream(folder_ / "mask" / "20.0.png", std::ios::trunc);  // 0 bytes
   EXPECT_FALSE((*segmenter)->segment(request(20)));
   EXPECT_FALSE(FolderSegmenter::open(folder_ / "absent", RoleTable()));
-  EXPECT_FALSE(FolderSegmenter::open(folder_, RoleTable()));  // nothing in it but roles.json
+  EXPECT_FALSE(FolderSegmenter::open(folder_.path(), RoleTable()));  // nothing in it but roles.json
   std::ofstream(folder_ / "roles.json") << "{";
   EXPECT_FALSE(FolderSegmenter::open(folder_ / "mask", RoleTable()));
 }

@@ -8,6 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -129,15 +131,13 @@ TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
   const auto absent = ModelDescription::read("/nonexistent");
   ASSERT_FALSE(absent);
   EXPECT_THAT(absent.error().message, HasSubstr("model.json"));
-  const fs::path folder = fs::temp_directory_path() / ("model_" + std::to_string(::getpid()));
-  fs::create_directories(folder);
+  const testing_support::TemporaryFolder folder;
   for (const char* text : {"", "{", "[]", "{\"format\": 2}", "{\"format\": 1, \"name\": 5}"}) {
     std::ofstream(folder / "model.json") << text;
-    const auto damaged = ModelDescription::read(folder);
+    const auto damaged = ModelDescription::read(folder.path());
     ASSERT_FALSE(damaged) << text;
     EXPECT_THAT(damaged.error().message, HasSubstr("model.json"));
   }
-  fs::remove_all(folder);
 }
 
 TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "semvslam/base/temporary_folder_test_support.h"
+
 namespace semvslam {
 namespace {
 
@@ -20,7 +22,6 @@ class SegmentationScoreTest : public ::testing::Test {
     golden_ = nlohmann::json::parse(file);
     std::ofstream(path_) << golden_.at("dataset").dump();
   }
-  ~SegmentationScoreTest() override { fs::remove(path_); }
 
   static cv::Mat mask_of(const nlohmann::json& detection, cv::Size size) {
     CocoRegion region;
@@ -28,7 +29,8 @@ class SegmentationScoreTest : public ::testing::Test {
     return region.mask(size);
   }
 
-  const fs::path path_ = fs::temp_directory_path() / ("coco_" + std::to_string(::getpid()) + ".json");
+  const testing_support::TemporaryFolder folder_;
+  const fs::path path_ = folder_ / "coco.json";
   nlohmann::json golden_;
 };
 
@@ -89,7 +91,8 @@ TEST(SegmentationScore, NothingFoundScoresZeroAndNothingLabelledScoresNothing) {
 }
 
 TEST(CocoDataset, DamagedFilesAreNamed) {
-  const fs::path path = fs::temp_directory_path() / ("coco_bad_" + std::to_string(::getpid()) + ".json");
+  const testing_support::TemporaryFolder folder;
+  const fs::path path = folder / "coco.json";
   for (const char* text :
        {"", "[]", "{\"images\": 3}", "{\"images\": [], \"categories\": [], \"annotations\": [{\"image_id\": 4}]}"}) {
     std::ofstream(path) << text;
@@ -97,7 +100,6 @@ TEST(CocoDataset, DamagedFilesAreNamed) {
     ASSERT_FALSE(dataset) << text;
     EXPECT_THAT(dataset.error().message, HasSubstr(path.string()));
   }
-  fs::remove(path);
   EXPECT_FALSE(CocoDataset::read(path));
 }
 
