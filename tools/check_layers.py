@@ -11,8 +11,7 @@ import re
 import sys
 
 # module -> modules it may use, beside `base`, which everything may use.
-CORE = {"geometry", "data", "feature", "map", "solve", "tracking", "mapping", "place", "motion", "semantic", "dynamic", "loop",
-        "dense"}
+CORE = {"geometry", "data", "feature", "map", "solve", "tracking", "mapping", "place", "motion", "semantic", "dynamic", "dense"}
 ALLOWED = {
     "base": set(),
     "geometry": set(),
@@ -27,8 +26,7 @@ ALLOWED = {
     "semantic": {"geometry", "data", "feature"},
     "dynamic": {"motion", "semantic", "data", "geometry"},
     "tracking": {"data", "feature", "map", "solve", "dynamic", "geometry"},
-    "mapping": {"feature", "map", "solve", "geometry"},
-    "loop": {"feature", "place", "map", "solve", "geometry"},
+    "mapping": {"feature", "place", "map", "solve", "geometry"},
     "dense": {"data", "geometry"},
     "pipeline": CORE,
     "apps": {"pipeline", "eval", "render", "data"} | CORE,

@@ -74,6 +74,7 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"landmarks", slam.landmarks},
                {"relocalised", slam.relocalised},
                {"revisits", slam.revisits},
+               {"loops", slam.loops},
                {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
                {"notices", slam.notices},
                {"stages_ms", stages},

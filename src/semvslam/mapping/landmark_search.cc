@@ -32,7 +32,9 @@ LandmarkMatches search_landmarks(const Map& map, const FrameFeatures& frame, con
   }
   std::vector<Match> matches;
   match_projected(queries, frame.orb, frame.grid, options, matches);
-  return pair_up(map, frame, sources, matches);
+  LandmarkMatches pairs = pair_up(map, frame, sources, matches);
+  pairs.in_view = sources.size();
+  return pairs;
 }
 
 }  // namespace semvslam

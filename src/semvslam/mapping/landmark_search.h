@@ -14,6 +14,7 @@ struct LandmarkMatches {
   std::vector<std::uint32_t> features;
   std::vector<Eigen::Vector3d> points;  // world, metres
   std::vector<PointObservation> observations;
+  std::size_t in_view = 0;  // landmarks that should have been seen, found or not; search_landmarks() only
 
   std::size_t size() const { return landmarks.size(); }
 };

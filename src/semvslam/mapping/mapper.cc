@@ -21,7 +21,7 @@ double lap_ms(Clock::time_point& start) {
 }  // namespace
 
 Mapper::Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model)
-    : options_(options), map_(std::move(model)) {}
+    : options_(options), map_(std::move(model)), loop_finder_(options.loop) {}
 
 std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::stop_token stop) {
   const Clock::time_point begin = Clock::now();
@@ -31,10 +31,17 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
   cull_landmarks(id);
   create_landmarks(id);
   times_.create_ms = lap_ms(lap);
+  remember_place(id);
+  const int revisits = revisits_;
   if (options_.revisit.enabled) {
     if (const std::optional<Revisit> revisit = find_revisit(map_, id, options_.revisit))
       revisits_ += close_revisit(map_, id, *revisit);
     times_.revisit_ms = lap_ms(lap);
+  }
+  if (options_.loop.enabled && revisits_ == revisits) {
+    if (const std::optional<Revisit> loop = loop_finder_.find(map_, places_, id))
+      loops_ += close_revisit(map_, id, *loop);
+    times_.loop_ms = lap_ms(lap);
   }
   if (map_.key_frames().size() > 1) {
     fuse_with_neighbours(id);
@@ -71,6 +78,14 @@ void Mapper::create_landmarks(KeyFrameId id) {
     const Eigen::Vector3d in_world = world_from_camera * map_.model().back_project(features, i);
     young_.push_back(map_.add_landmark(in_world, id, static_cast<std::uint32_t>(i)));
   }
+}
+
+void Mapper::remember_place(KeyFrameId id) {
+  const KeyFrame& key_frame = *map_.key_frame(id);
+  std::vector<Descriptor> descriptors;
+  for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
+    if (key_frame.landmarks[i].valid()) descriptors.push_back(key_frame.features->orb.descriptors[i]);
+  places_.add(id, descriptors);
 }
 
 void Mapper::cull_landmarks(KeyFrameId newest) {
@@ -270,6 +285,7 @@ void Mapper::cull_key_frames(KeyFrameId newest) {
     if (c.key_frame == oldest || c.key_frame == newest) continue;
     if (!is_redundant(*map_.key_frame(c.key_frame))) continue;
     const std::vector<Covisible> neighbours = map_.covisible(c.key_frame, 1);
+    places_.remove(c.key_frame);
     map_.remove_key_frame(c.key_frame, neighbours.empty() ? newest : neighbours.front().key_frame);
   }
 }

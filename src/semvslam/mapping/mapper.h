@@ -7,6 +7,7 @@
 #include "semvslam/feature/matching.h"
 #include "semvslam/map/local_map.h"
 #include "semvslam/map/map.h"
+#include "semvslam/mapping/loop.h"
 #include "semvslam/mapping/relocalise.h"
 #include "semvslam/mapping/revisit.h"
 #include "semvslam/solve/bundle_adjustment.h"
@@ -27,6 +28,7 @@ struct MappingOptions {
   double redundant_ratio = 0.9;  // a key frame goes when this share of its landmarks is seen in three others
   LocalMapOptions local_map;
   RevisitOptions revisit;
+  LoopOptions loop;
   RelocaliseOptions relocalise;
 };
 
@@ -41,11 +43,12 @@ struct NewKeyFrame {
 
 /// Milliseconds of one mapping step, by part.
 struct MappingTimes {
-  double create_ms = 0, revisit_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
+  double create_ms = 0, revisit_ms = 0, loop_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
 };
 
 /// The one writer of the map: takes key frames in, makes, fuses, adjusts and culls. Every step works on a bounded
-/// neighbourhood of the new key frame. No threads inside; the same calls give the same map.
+/// neighbourhood of the new key frame; only when drift is removed every key frame moves. No threads inside; the same
+/// calls give the same map.
 class Mapper {
  public:
   Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model);
@@ -56,7 +59,8 @@ class Mapper {
   void adjust_all(std::stop_token stop = {});
   /// Looks for a lost frame in the whole map; nothing when it is nowhere, or not to be looked for.
   std::optional<Relocalisation> relocalise(const FrameFeatures& features) const {
-    return options_.relocalise.enabled ? semvslam::relocalise(map_, features, options_.relocalise) : std::nullopt;
+    return options_.relocalise.enabled ? semvslam::relocalise(map_, places_, features, options_.relocalise)
+                                       : std::nullopt;
   }
   /// The snapshot around a key frame of the map, for tracking to go on there.
   std::shared_ptr<const LocalMap> local_map(KeyFrameId reference) const {
@@ -68,12 +72,14 @@ class Mapper {
 
   const Map& map() const { return map_; }
   const MappingTimes& times() const { return times_; }
-  /// How often drift since an earlier visit was removed.
+  /// How often drift since an earlier visit was removed: found where the camera should be, found by appearance.
   int revisits() const { return revisits_; }
+  int loops() const { return loops_; }
 
  private:
   KeyFrameId insert(const NewKeyFrame& key_frame);
   void create_landmarks(KeyFrameId id);
+  void remember_place(KeyFrameId id);
   void cull_landmarks(KeyFrameId newest);
   std::vector<KeyFrameId> fusion_partners(KeyFrameId id) const;
   void fuse_with_neighbours(KeyFrameId id);
@@ -89,7 +95,9 @@ class Mapper {
   MappingOptions options_;
   Map map_;
   MappingTimes times_;
-  int revisits_ = 0;
+  PlaceIndex places_;  // of every key frame
+  LoopFinder loop_finder_;
+  int revisits_ = 0, loops_ = 0;
   std::vector<LandmarkId> young_;  // ascending
   std::vector<ProjectedQuery> queries_;
   std::vector<Match> matches_;

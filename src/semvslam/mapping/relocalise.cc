@@ -9,7 +9,8 @@
 namespace semvslam {
 namespace {
 
-constexpr std::size_t kSample = 200;    // descriptors that all key frames are compared by
+constexpr std::size_t kFromIndex = 4;   // key frames for every candidate: words are a coarser measure than descriptors
+constexpr std::size_t kSample = 200;    // descriptors that these are compared by
 constexpr std::size_t kLeastVotes = 6;  // of them in one key frame; chance gives one or two
 constexpr int kFirstNeighbours = 4;     // of a candidate, for a first pose: more would only be more to confuse
 constexpr int kLeastFirst = 12;         // landmarks that agree with it
@@ -19,42 +20,57 @@ MatchOptions matching(const RelocaliseOptions& options) {
   return {.max_distance = options.max_distance_bits, .ratio = 0.8f, .check_rotation = false};
 }
 
+bool among(const std::vector<KeyFrameId>& key_frames, KeyFrameId id) {
+  return std::ranges::find(key_frames, id) != key_frames.end();
+}
+
 /// Key frames by how many of the sample they hold, most first.
-std::vector<KeyFrameId> most_alike(const Map& map, const FrameFeatures& features, const RelocaliseOptions& options) {
+std::vector<KeyFrameId> most_alike(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
+                                   const RelocaliseOptions& options, const SearchScope& scope) {
+  const auto candidates = static_cast<std::size_t>(options.candidates);
   std::vector<Descriptor> sample, seen;
   const std::size_t step = std::max<std::size_t>(1, features.size() / kSample);
   for (std::size_t i = 0; i < features.size(); i += step) sample.push_back(features.orb.descriptors[i]);
   std::vector<std::pair<std::size_t, KeyFrameId>> votes;
   std::vector<Match> matches;
-  for (const auto& [id, key_frame] : map.key_frames()) {
+  std::size_t compared = 0;
+  for (const PlaceScore& place : places.query(features.orb.descriptors)) {
+    if (compared == kFromIndex * candidates) break;
+    if (place.key_frame >= scope.before || among(scope.apart_from, place.key_frame)) continue;
+    ++compared;
+    if (!scope.apart_from.empty() && std::ranges::any_of(map.covisible(place.key_frame, kLeastShared),
+                                                         [&](auto& c) { return among(scope.apart_from, c.key_frame); }))
+      continue;
+    const KeyFrame& key_frame = *map.key_frame(place.key_frame);
     seen.clear();
     for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
       if (key_frame.landmarks[i].valid()) seen.push_back(key_frame.features->orb.descriptors[i]);
     match_brute_force(sample, seen, matching(options), matches);
-    if (matches.size() >= kLeastVotes) votes.emplace_back(matches.size(), id);
+    if (matches.size() >= kLeastVotes) votes.emplace_back(matches.size(), place.key_frame);
   }
   std::sort(votes.rbegin(), votes.rend());  // of equal ones the newer first
+  if (votes.size() > candidates) votes.resize(candidates);
   std::vector<KeyFrameId> out;
-  for (const auto& [count, id] : votes) {
-    if (out.size() == static_cast<std::size_t>(options.candidates)) break;
-    out.push_back(id);
-  }
+  for (const auto& [count, id] : votes) out.push_back(id);
   return out;
 }
 
-std::vector<LandmarkId> landmarks_around(const Map& map, KeyFrameId id, int neighbours) {
+std::vector<LandmarkId> landmarks_around(const Map& map, KeyFrameId id, int neighbours, const SearchScope& scope) {
   std::vector<KeyFrameId> key_frames{id};
   for (const Covisible& c : map.covisible(id, kLeastShared)) {
     if (key_frames.size() > static_cast<std::size_t>(neighbours)) break;
-    key_frames.push_back(c.key_frame);
+    if (c.key_frame < scope.before) key_frames.push_back(c.key_frame);
   }
-  return map.landmarks_of(key_frames);
+  std::vector<LandmarkId> landmarks = map.landmarks_of(key_frames);
+  std::erase_if(landmarks,
+                [&](LandmarkId l) { return map.landmark(l)->observations.back().key_frame >= scope.before; });
+  return landmarks;
 }
 
 /// By descriptors alone.
 std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, KeyFrameId id,
-                              const RelocaliseOptions& options) {
-  const std::vector<LandmarkId> landmarks = landmarks_around(map, id, kFirstNeighbours);
+                              const RelocaliseOptions& options, const SearchScope& scope) {
+  const std::vector<LandmarkId> landmarks = landmarks_around(map, id, kFirstNeighbours, scope);
   std::vector<Descriptor> descriptors;
   for (const LandmarkId l : landmarks) descriptors.push_back(map.landmark(l)->descriptor);
   std::vector<Match> matches;
@@ -69,16 +85,17 @@ std::optional<SE3> first_pose(const Map& map, const FrameFeatures& features, Key
 
 /// Searches everything that should be seen from there.
 std::optional<Relocalisation> confirm(const Map& map, const FrameFeatures& features, KeyFrameId id, const SE3& pose,
-                                      const RelocaliseOptions& options) {
-  const LandmarkMatches pairs = search_landmarks(map, features, pose, landmarks_around(map, id, options.neighbours),
-                                                 options.radius_px, matching(options));
+                                      const RelocaliseOptions& options, const SearchScope& scope) {
+  const LandmarkMatches pairs = search_landmarks(
+      map, features, pose, landmarks_around(map, id, options.neighbours, scope), options.radius_px, matching(options));
   std::vector<std::uint8_t> inlier;
   const PoseEstimate estimate = optimize_pose(map.model().intrinsics(), pose, pairs.points, pairs.observations,
                                               {.chi2_disparity = map.model().chi2_disparity()}, inlier);
   if (estimate.inliers < options.min_inliers ||
       estimate.inliers < options.min_share * static_cast<double>(pairs.size()))
     return std::nullopt;
-  Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers};
+  Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers,
+                       static_cast<int>(pairs.in_view)};
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (inlier[i]) found.landmarks[pairs.features[i]] = pairs.landmarks[i];
   return found;
@@ -100,11 +117,11 @@ void RelocaliseOptions::add_to(ConfigSchema& s) {
   s.add("mapping.relocalise.min_share", &min_share, {0, 1}, "share of the landmarks found that must agree");
 }
 
-std::optional<Relocalisation> relocalise(const Map& map, const FrameFeatures& features,
-                                         const RelocaliseOptions& options) {
-  for (const KeyFrameId id : most_alike(map, features, options))
-    if (const std::optional<SE3> pose = first_pose(map, features, id, options))
-      if (std::optional<Relocalisation> found = confirm(map, features, id, *pose, options)) return found;
+std::optional<Relocalisation> relocalise(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
+                                         const RelocaliseOptions& options, const SearchScope& scope) {
+  for (const KeyFrameId id : most_alike(map, places, features, options, scope))
+    if (const std::optional<SE3> pose = first_pose(map, features, id, options, scope))
+      if (std::optional<Relocalisation> found = confirm(map, features, id, *pose, options, scope)) return found;
   return std::nullopt;
 }
 

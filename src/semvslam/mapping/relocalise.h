@@ -5,6 +5,7 @@
 
 #include "semvslam/base/config_schema.h"
 #include "semvslam/map/map.h"
+#include "semvslam/place/place_index.h"
 
 namespace semvslam {
 
@@ -26,13 +27,21 @@ struct Relocalisation {
   SE3 camera_from_world;
   std::vector<LandmarkId> landmarks;  // per feature; invalid = none
   int inliers = 0;
+  int in_view = 0;  // landmarks of the place that should be seen from there
 };
 
-/// Looks for a frame in the whole map by what it looks like, without any idea where the camera is. Every key frame is
-/// compared by a sample of the frame's descriptors; for those that agree best PnP gives a pose (estimate_pose()), with
-/// which the landmarks around are searched, and a robust pose over all of them decides. Without a vocabulary: the time
-/// grows with the number of key frames.
-std::optional<Relocalisation> relocalise(const Map& map, const FrameFeatures& features,
-                                         const RelocaliseOptions& options);
+/// The part of the map that is searched.
+struct SearchScope {
+  /// Key frames from this one on are left out, and so is every landmark that one of them sees.
+  KeyFrameId before{KeyFrameId::kNone};
+  /// So are these key frames, and those that share landmarks with them.
+  std::vector<KeyFrameId> apart_from = {};
+};
+
+/// Looks for a frame in the map by what it looks like, without any idea where the camera is. The index names key
+/// frames, which are compared by a sample of the frame's descriptors; for those that agree best PnP gives a pose
+/// (estimate_pose()), with which the landmarks around are searched, and a robust pose over all of them decides.
+std::optional<Relocalisation> relocalise(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
+                                         const RelocaliseOptions& options, const SearchScope& scope = {});
 
 }  // namespace semvslam

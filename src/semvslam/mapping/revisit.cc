@@ -27,18 +27,6 @@ std::vector<KeyFrameId> earlier_key_frames(const Map& map, KeyFrameId id, KeyFra
                            recent);
 }
 
-double median_shift_px(const Map& map, const Revisit& revisit, const SE3& before) {
-  const Camera& camera = map.model().camera();
-  std::vector<double> shifts;
-  for (const auto& [landmark, feature] : revisit.matches) {
-    const Eigen::Vector3d& p = map.landmark(landmark)->position;
-    shifts.push_back((camera.project(before * p) - camera.project(revisit.camera_from_world * p)).norm());
-  }
-  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
-  std::nth_element(shifts.begin(), middle, shifts.end());
-  return *middle;
-}
-
 PoseGraphProblem::Edge edge(std::uint32_t a, std::uint32_t b, const SE3& a_from_b, double landmarks) {
   // As if every landmark said 1 cm and 0.3 deg of the relative pose: only the proportions matter.
   PoseGraphProblem::Edge e{a, b, a_from_b};
@@ -89,6 +77,23 @@ void RevisitOptions::add_to(ConfigSchema& s) {
   s.add("mapping.revisit.least_shift_px", &least_shift_px, {0, 100}, "less of a correction is left to fusion, px");
 }
 
+double median_shift_px(const Map& map, KeyFrameId id, const Revisit& revisit) {
+  const Camera& camera = map.model().camera();
+  const SE3& now = map.key_frame(id)->camera_from_world;
+  std::vector<double> shifts;
+  for (const auto& [landmark, feature] : revisit.matches) {
+    const Eigen::Vector3d& p = map.landmark(landmark)->position;
+    const Eigen::Vector3d drifted = now * p;
+    // Behind the camera that has drifted so far: as much as a whole image.
+    shifts.push_back(drifted.z() <= 0
+                         ? camera.width_px
+                         : (camera.project(drifted) - camera.project(revisit.camera_from_world * p)).norm());
+  }
+  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
+  std::nth_element(shifts.begin(), middle, shifts.end());
+  return *middle;
+}
+
 std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options) {
   const KeyFrame& key_frame = *map.key_frame(id);
   auto first_recent = map.key_frames().find(id);
@@ -111,7 +116,7 @@ std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const Revisit
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (estimate->inlier[i]) revisit.matches.emplace_back(pairs.landmarks[i], pairs.features[i]);
   if (revisit.matches.empty()) return std::nullopt;
-  revisit.shift_px = median_shift_px(map, revisit, key_frame.camera_from_world);
+  revisit.shift_px = median_shift_px(map, id, revisit);
   if (revisit.shift_px < options.least_shift_px) return std::nullopt;
   return revisit;
 }

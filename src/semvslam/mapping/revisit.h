@@ -34,9 +34,12 @@ struct Revisit {
   double shift_px = 0;                                        // median
 };
 
+/// How far the correction moves the matched landmarks in the key frame's image: median, pixels.
+double median_shift_px(const Map& map, KeyFrameId id, const Revisit& revisit);
+
 /// Searches the landmarks of earlier visits, which the last key frames did not see, around where the newest key frame
 /// should see them. The window is wide enough for centimetres of drift; a robust pose over all that is found decides.
-/// Unlike a search by appearance it needs no vocabulary, and finds only places whose drift is still small.
+/// Finds places whose drift is still small, at any speed; for the others see loop.h.
 std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options);
 
 /// Spreads the correction over the key frames since then and moves their landmarks along (essential graph: Strasdat et

@@ -72,6 +72,7 @@ void describe(ConfigSchema& s, MappingOptions& m) {
   s.add("mapping.redundant_ratio", &m.redundant_ratio, {0.1, 1},
         "a key frame goes when this share of its landmarks is seen in three others");
   m.revisit.add_to(s);
+  m.loop.add_to(s);
   m.relocalise.add_to(s);
   LocalMapOptions& l = m.local_map;
   s.add("mapping.local_map.covisible_key_frames", &l.covisible_key_frames, {1, 1000},

@@ -92,6 +92,7 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
     const MappingTimes& t = mapper.times();
     timers["mapping.create"].add_ms(t.create_ms);
     timers["mapping.revisit"].add_ms(t.revisit_ms);
+    timers["mapping.loop"].add_ms(t.loop_ms);
     timers["mapping.fuse"].add_ms(t.fuse_ms);
     timers["mapping.bundle"].add_ms(t.bundle_ms);
     timers["mapping.cull"].add_ms(t.cull_ms);
@@ -395,6 +396,7 @@ SlamStatistics Slam::statistics() const {
   statistics.landmarks = impl_->mapper.map().landmark_count();
   statistics.relocalised = impl_->found_again;
   statistics.revisits = static_cast<std::uint64_t>(impl_->mapper.revisits());
+  statistics.loops = static_cast<std::uint64_t>(impl_->mapper.loops());
   statistics.dynamic = impl_->dynamic;
   statistics.notices = impl_->notices;
   statistics.stages = impl_->timers.summaries();

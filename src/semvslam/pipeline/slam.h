@@ -56,6 +56,7 @@ struct SlamStatistics {
   std::uint64_t key_frames = 0, landmarks = 0;
   std::uint64_t relocalised = 0;  // times that a lost camera was found in the map
   std::uint64_t revisits = 0;     // times that drift since an earlier visit of a place was removed
+  std::uint64_t loops = 0;        // the same, where the place was recognised by what it looks like alone
   DynamicTotals dynamic;
   std::vector<std::string> notices;  // what went wrong without ending the run, each once
   std::vector<StageSummary> stages;
