@@ -2,8 +2,9 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "semvslam/base/ranked.h"
 
 namespace semvslam {
 namespace {
@@ -19,12 +20,7 @@ double per_frame(double seconds, std::uint64_t frames) {
 }
 
 /// Null when there is nothing.
-Json median_of(std::vector<double> values) {
-  if (values.empty()) return nullptr;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+Json median_of(std::vector<double> values) { return values.empty() ? Json() : Json(median(std::span(values))); }
 
 template <typename Name, std::size_t N>
 Json counts(const std::array<std::uint64_t, N>& values) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/base/side_task.h"
 #include "semvslam/dynamic/instance_rest.h"
 #include "semvslam/dynamic/mover_reach.h"
@@ -24,10 +25,7 @@ float median_depth_m(const Instance& instance, const cv::Mat& depth, float metre
       if (instance.mask.at<std::uint8_t>(y, x) == 0) continue;
       if (const float d = depth_at_m(depth, metres_per_unit, window.x + x, window.y + y); d > 0) depths_m.push_back(d);
     }
-  if (depths_m.empty()) return 0;
-  const auto middle = depths_m.begin() + static_cast<std::ptrdiff_t>(depths_m.size() / 2);
-  std::nth_element(depths_m.begin(), middle, depths_m.end());
-  return *middle;
+  return depths_m.empty() ? 0 : median(std::span(depths_m));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/eval/evaluation.h"
 #include "semvslam/eval/svg_chart.h"
 
@@ -19,9 +20,7 @@ std::int64_t longest_step_ns(const std::vector<TimeStamp>& stamps) {
   std::vector<std::int64_t> steps;
   for (std::size_t i = 1; i < stamps.size(); ++i) steps.push_back(stamps[i].ns - stamps[i - 1].ns);
   if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return std::max<std::int64_t>(10 * *middle, 500'000'000);
+  return std::max<std::int64_t>(10 * median(std::span(steps)), 500'000'000);
 }
 
 struct Curve {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/mapping/landmark_search.h"
 #include "semvslam/solve/pnp.h"
 #include "semvslam/solve/pose_graph.h"
@@ -89,9 +90,7 @@ double median_shift_px(const Map& map, KeyFrameId id, const Revisit& revisit) {
                          ? camera.width_px
                          : (camera.project(drifted) - camera.project(revisit.camera_from_world * p)).norm());
   }
-  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
-  std::nth_element(shifts.begin(), middle, shifts.end());
-  return *middle;
+  return median(std::span(shifts));
 }
 
 std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options) {

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {
@@ -79,9 +80,7 @@ float median_depth_m(const cv::Mat& depth, float metres_per_unit, int x, int y) 
     for (int u = std::max(0, x - 1); u <= std::min(depth.cols - 1, x + 1); ++u)
       if (const float d = depth_at_m(depth, metres_per_unit, u, v); d > 0) values[count++] = d;
   if (count < 3) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count / 2),
-                   values.begin() + static_cast<std::ptrdiff_t>(count));
-  return values[count / 2];
+  return median(std::span(values).first(count));
 }
 
 void require(bool holds, const char* what) {

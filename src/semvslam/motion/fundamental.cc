@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/geometry/epipolar.h"
 #include "semvslam/geometry/ransac.h"
 
@@ -80,9 +81,7 @@ struct HomographyProblem {
 double median_motion(Pixels a, Pixels b) {
   std::vector<double> squared(a.size());
   for (std::size_t i = 0; i < a.size(); ++i) squared[i] = (b[i] - a[i]).squaredNorm();
-  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
-  std::nth_element(squared.begin(), middle, squared.end());
-  return std::sqrt(*middle);
+  return std::sqrt(median(std::span(squared)));
 }
 
 // Share of F's inliers that one homography explains to the same accuracy: near 1, the pairs do not tell F.
@@ -126,10 +125,8 @@ void refine(Pixels a, Pixels b, const EpipolarProblem& problem, double squared_l
       if (squared[i] <= squared_limit) of_inliers.push_back(squared[i]);
     }
     if (of_inliers.size() < 8) return;
-    const auto middle = of_inliers.begin() + static_cast<std::ptrdiff_t>(of_inliers.size() / 2);
-    std::nth_element(of_inliers.begin(), middle, of_inliers.end());
     const double sigmas = 3 * 1.4826;  // of the median: three standard deviations
-    const double limit = std::min(squared_limit, sigmas * sigmas * *middle);
+    const double limit = std::min(squared_limit, sigmas * sigmas * median(std::span(of_inliers)));
     std::vector<Eigen::Vector2d> from, to;
     for (std::size_t i = 0; i < a.size(); ++i)
       if (squared[i] <= limit) from.push_back(a[i]), to.push_back(b[i]);

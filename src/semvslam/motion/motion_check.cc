@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/geometry/epipolar.h"
 
 namespace semvslam {
@@ -174,9 +175,7 @@ MotionCheckResult MotionCheck::step(const MotionFrame& frame, std::span<const Fl
   for (const FlowTrack& track : tracks)
     if (track.size() > 1) ages.push_back(track.size() - 1);
   if (!ages.empty()) {
-    const auto quarter = ages.begin() + static_cast<std::ptrdiff_t>(ages.size() / 4);
-    std::nth_element(ages.begin(), quarter, ages.end());
-    result.fundamental_age = std::clamp(*quarter, 1, options_.max_baseline_frames);
+    result.fundamental_age = std::clamp(quantile(std::span(ages), 0.25), 1, options_.max_baseline_frames);
     result.fundamental = find_fundamental(tracks, result.fundamental_age);
   }
   result.tracks.reserve(tracks.size());
@@ -307,10 +306,8 @@ double MotionCheck::noise_scale(std::span<const TrackMotion> motions, std::span<
   // The quantile below which 40 % lie is that of points at rest even when half of the points move; chi^2 with two
   // degrees of freedom has it at -2 log(1 - 0.4).
   constexpr double kShare = 0.4;
-  const auto at = squared.begin() + static_cast<std::ptrdiff_t>(kShare * static_cast<double>(squared.size()));
-  std::nth_element(squared.begin(), at, squared.end());
   const double expected = -2 * std::log(1 - kShare);
-  return std::clamp(std::sqrt(*at / expected), 1.0, kMaxNoiseScale);
+  return std::clamp(std::sqrt(quantile(std::span(squared), kShare) / expected), 1.0, kMaxNoiseScale);
 }
 
 void MotionCheck::decide(const FlowTrack& track, const MotionCheckResult& result, TrackMotion& motion) const {

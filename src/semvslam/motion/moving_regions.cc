@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "semvslam/base/ranked.h"
+
 namespace semvslam {
 namespace {
 
@@ -285,10 +287,7 @@ void MovingRegions::update(Kept& kept, const MotionFrame& frame, std::span<const
     }
   }
   kept.members = std::move(alive);
-  if (!depths.empty()) {
-    std::nth_element(depths.begin(), depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2), depths.end());
-    region.depth_m = depths[depths.size() / 2];
-  }
+  if (!depths.empty()) region.depth_m = median(std::span(depths));
   for (const Evidence& e : without_strays(kept.anchors)) {
     // At an edge of depth it is open which side a track belongs to.
     const bool edge = e.depth_spread_m > 0.05f * e.depth_m;

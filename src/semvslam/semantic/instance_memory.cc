@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 #include <span>
 
+#include "semvslam/base/ranked.h"
+
 namespace semvslam {
 namespace {
 
@@ -118,10 +120,7 @@ float median_depth_m(const cv::Rect& window, const cv::Mat& mask, const cv::Mat&
       if (const float d = half_depth.at<float>(y / 2, x / 2); d > 0) depths.push_back(d);
     }
   if (measured_share) *measured_share = n > 0 ? static_cast<double>(depths.size()) / n : 0;
-  if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 0 : median(std::span(depths));
 }
 
 /// A lost part is measured, touches what is left of the object, and goes on at the depth it has there.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/geometry/depth_image.h"
 #include "semvslam/semantic/mask_motion.h"
 
@@ -39,9 +40,7 @@ DepthRange depth_range(const HalfMask& object, const cv::Mat& half_depth) {
   }
   if (depths.size() < 20) return {};
   const auto quantile = [&](double share) {
-    const auto at = depths.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(depths.size() - 1));
-    std::nth_element(depths.begin(), at, depths.end());
-    return *at;
+    return ranked(std::span(depths), static_cast<std::size_t>(share * static_cast<double>(depths.size() - 1)));
   };
   return {quantile(0.05), quantile(0.95), true};
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "semvslam/base/ranked.h"
 #include "semvslam/feature/lucas_kanade.h"
 
 namespace semvslam {
@@ -20,12 +21,7 @@ struct Pair {
   bool has_depth = false;
 };
 
-float median(std::vector<float> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+float median_of(std::vector<float> values) { return values.empty() ? 0 : median(std::span(values)); }
 
 /// Of the grey gradient by Scharr's filter, |x| + |y|.
 int gradient_strength(const cv::Mat& image, int x, int y) {
@@ -77,7 +73,7 @@ std::vector<Pair> pairs_by_pose(const Camera& camera, const cv::Mat& half_depth,
   std::vector<float> depths;
   for (const cv::Point2f& p : points)
     if (const float d = depth_at(half_depth, p); d > 0) depths.push_back(d);
-  const float usual_m = median(depths);
+  const float usual_m = median_of(depths);
   std::vector<Pair> out;
   for (const cv::Point2f& p : points) {
     float d = depth_at(half_depth, p);
@@ -99,7 +95,7 @@ cv::Point2f median_shift(const std::vector<Pair>& pairs) {
     x.push_back(p.to.x - p.from.x);
     y.push_back(p.to.y - p.from.y);
   }
-  return {median(x), median(y)};
+  return {median_of(x), median_of(y)};
 }
 
 std::vector<Pair> pairs_by_flow(const CarryFrame& from, const CarryFrame& to, const std::vector<cv::Point2f>& points,
@@ -119,7 +115,7 @@ std::vector<Pair> pairs_by_flow(const CarryFrame& from, const CarryFrame& to, co
     found.push_back({p, q});
     errors.push_back(patch_difference(from.pyramid(), p, to.pyramid(), q, options.window_px, false));
   }
-  const float limit = std::max(8.f, 3.f * median(errors));  // grey levels
+  const float limit = std::max(8.f, 3.f * median_of(errors));  // grey levels
   std::vector<Pair> out;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (errors[i] > limit) continue;
@@ -171,7 +167,7 @@ std::vector<Pair> consistent(std::vector<Pair> pairs, Affine& affine) {
   std::vector<float> changes;
   for (const Pair& p : pairs)
     if (p.has_depth) changes.push_back(p.depth_change_m);
-  const float change = median(changes);
+  const float change = median_of(changes);
   std::erase_if(pairs, [&](const Pair& p) { return p.has_depth && std::abs(p.depth_change_m - change) > kSpreadM; });
   for (int round = 0; round < 2 && pairs.size() >= kLeastPoints; ++round) {
     affine = fit_affine(pairs);
@@ -181,7 +177,7 @@ std::vector<Pair> consistent(std::vector<Pair> pairs, Affine& affine) {
       rest.push_back(p.from - p.to - affine(p.to));
       sizes.push_back(std::sqrt(rest.back().dot(rest.back())));
     }
-    const float limit = std::max(1.5f, 3.f * median(sizes));
+    const float limit = std::max(1.5f, 3.f * median_of(sizes));
     std::vector<Pair> kept;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       bool keep = sizes[i] <= limit;
@@ -269,7 +265,7 @@ MaskMotion estimate_motion(const Camera& camera, const MaskCarryOptions& options
       spread = std::max(spread, distance(p.to - p.from, out.shift));
       if (p.has_depth) changes.push_back(p.depth_change_m);
     }
-    out.depth_change_m = median(changes);
+    out.depth_change_m = median_of(changes);
     affine = fit_affine(pairs);
   } else {
     pairs.clear();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "semvslam/base/ranked.h"
+
 namespace semvslam {
 
 void PixelScore::add(const cv::Mat& found_mask, const cv::Mat& truth_mask) {
@@ -73,9 +75,7 @@ double ChangeStatistics::quantile(int gap, double quantile, bool losses_only) co
     for (const double c : changes_[gap_index(gap)])
       if (!losses_only || c < 0) values.push_back(std::abs(c));
   if (values.empty()) return -1;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(quantile * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return ranked(std::span(values), static_cast<std::size_t>(quantile * static_cast<double>(values.size() - 1)));
 }
 
 }  // namespace semvslam
