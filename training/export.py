@@ -80,14 +80,23 @@ def load(path, *earlier):
 
 
 def write_onnx(net, out, size):
-    c = model.CHANNELS
-    jobs = (("trunk", Trunk(net), torch.zeros(1, 3, *size), "image", TRUNK_OUT, None),
-            ("box", Box(net), torch.zeros(4, 7, 7, c), "rois", ["probabilities", "deltas"], {"rois": {0: "n"}, "probabilities": {0: "n"}, "deltas": {0: "n"}}),
-            ("mask", Mask(net), torch.zeros(4, 14, 14, c), "rois", ["masks"], {"rois": {0: "n"}, "masks": {0: "n"}}))
-    for name, m, x, given, outs, dyn in jobs:
-        torch.onnx.export(m.eval(), (x,), os.path.join(out, name + ".onnx"), input_names=[given], output_names=outs, dynamic_axes=dyn,
-                          opset_version=10, dynamo=False)
-        bake_padding(os.path.join(out, name + ".onnx"))
+    write_graph(out, "trunk", Trunk(net), torch.zeros(1, 3, *size), "image", TRUNK_OUT)
+    write_graph(out, "box", Box(net), torch.zeros(4, 7, 7, model.CHANNELS), "rois", ["probabilities", "deltas"], free=True)
+    write_mask(net, out)
+
+
+def write_mask(net, out):
+    """net: anything whose `mask` is the mask head."""
+    write_graph(out, "mask", Mask(net), torch.zeros(4, 14, 14, model.CHANNELS), "rois", ["masks"], free=True)
+
+
+def write_graph(out, name, module, x, given, outs, free=False):
+    """free: any number of rois."""
+    path = os.path.join(out, name + ".onnx")
+    torch.onnx.export(module.eval(), (x,), path, input_names=[given], output_names=outs, opset_version=10, dynamo=False,
+                      dynamic_axes={n: {0: "n"} for n in (given, *outs)} if free else None)
+    bake_padding(path)
+    round_weights(path)
 
 
 def bake_padding(path):
@@ -166,6 +175,25 @@ def round_weights(path):
     onnx.save(m, path)
 
 
+def coarse_weights(path, bits):
+    """Weights on a grid, whose step is a power of two of each output channel's own: files pack smaller still. Returns that size."""
+    import zlib
+
+    import onnx
+    from onnx import numpy_helper
+    m = onnx.load(path)
+    for i in m.graph.initializer:
+        w = numpy_helper.to_array(i)
+        if w.dtype != np.float32 or w.ndim < 2:
+            continue
+        rows = w.reshape(len(w), -1)
+        step = 2.0 ** np.ceil(np.log2(np.maximum(np.abs(rows).max(1, keepdims=True), 1e-12) / (2 ** (bits - 1) - 1)))
+        i.CopyFrom(numpy_helper.from_array((np.round(rows / step) * step).astype(np.float32).reshape(w.shape), i.name))
+    onnx.save(m, path)
+    with open(path, "rb") as f:
+        return len(zlib.compress(f.read(), 9))
+
+
 def sha(path):
     with open(path, "rb") as f:
         return hashlib.sha256(f.read()).hexdigest()
@@ -194,8 +222,6 @@ def main():
     size = infer.size_of(o.size)
     net, state = load(o.checkpoint, *o.average)
     write_onnx(net, o.out, size)
-    for name in ("trunk", "box", "mask"):
-        round_weights(os.path.join(o.out, name + ".onnx"))
     if o.int8:
         quantise(o.out, list(calibration(*o.int8, size)))
     with open(os.path.join(o.out, "model.json"), "w") as f:

@@ -22,7 +22,7 @@ BOX_LEVELS, MASK_LEVELS = (112.0, 336.0), (224.0,)
 GREY = 127
 PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
-SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.48     # of persons' masks
+SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.44     # of persons' masks
 SURE = 0.45                                     # least score beside a camera: even odds, and a mask as sure as good ones are (0.9)
 SURE_OF_STILLS = 0.55                           # of single pictures: nothing comes after it that would see a false person
 

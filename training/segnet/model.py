@@ -63,7 +63,7 @@ class MaskHead(nn.Module):
 
     def __init__(self):
         super().__init__()
-        self.convs = nn.Sequential(*[conv_bn(CHANNELS, CHANNELS) for _ in range(3)])
+        self.convs = nn.Sequential(*[conv_bn(CHANNELS, CHANNELS) for _ in range(4)])
         # Twice the size: what a 2x2 transposed convolution of stride 2 does, whose gradient is slow on CPUs.
         self.up = nn.Sequential(nn.Conv2d(CHANNELS, 64 * 4, 1), nn.PixelShuffle(2))
         self.logits = nn.Conv2d(64, 2, 1)
