@@ -108,7 +108,7 @@ Held-out pictures drawn by people (`val.json`, {c['images']} images), seen 768 p
 | all classes, mask AP50 / AP | {c['all_segm_ap50']:.3f} / {c['all_segm_ap']:.3f} | |
 
 Other widths, and eight bits as processors without fast 16-bit floats run it: `run` takes {size['width']} px in floats and, in eight bits,
-512 px with instructions for them (VNNI) and 416 px without, `segment` {size['width']} px in eight bits (near persons: found, mean IoU):
+512 px with instructions for them (VNNI) and 416 px without, `segment --precision int8` {size['width']} px (near persons: found, mean IoU):
 
 | trunk | AP50 | pixel IoU | near persons |
 |---|---|---|---|

@@ -54,10 +54,12 @@ std::optional<Revisit> LoopFinder::candidate(const Map& map, const PlaceIndex& p
   if (first_recent == map.key_frames().begin()) return std::nullopt;
   SearchScope scope{first_recent->first};
   for (const Covisible& c : map.covisible(id, kConnected)) scope.apart_from.push_back(c.key_frame);
-  const std::optional<Relocalisation> place =
-      relocalise(map, places, *map.key_frame(id)->features,
-                 {.candidates = options_.candidates, .min_inliers = options_.min_inliers}, scope);
-  if (!place || place->inliers < options_.min_seen_share * place->in_view) return std::nullopt;
+  const std::optional<Relocalisation> place = relocalise(map, places, *map.key_frame(id)->features,
+                                                         {.candidates = options_.candidates,
+                                                          .min_inliers = options_.min_inliers,
+                                                          .min_seen_share = options_.min_seen_share},
+                                                         scope);
+  if (!place) return std::nullopt;
   Revisit loop{place->key_frame, place->camera_from_world, {}, 0};
   for (std::uint32_t f = 0; f < place->landmarks.size(); ++f)
     if (place->landmarks[f].valid()) loop.matches.emplace_back(place->landmarks[f], f);

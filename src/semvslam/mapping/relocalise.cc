@@ -92,10 +92,10 @@ std::optional<Relocalisation> confirm(const Map& map, const FrameFeatures& featu
   const PoseEstimate estimate = optimize_pose(map.model().intrinsics(), pose, pairs.points, pairs.observations,
                                               {.chi2_disparity = map.model().chi2_disparity()}, inlier);
   if (estimate.inliers < options.min_inliers ||
-      estimate.inliers < options.min_share * static_cast<double>(pairs.size()))
+      estimate.inliers < options.min_share * static_cast<double>(pairs.size()) ||
+      estimate.inliers < options.min_seen_share * static_cast<double>(pairs.in_view))
     return std::nullopt;
-  Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers,
-                       static_cast<int>(pairs.in_view)};
+  Relocalisation found{id, estimate.camera_from_world, std::vector<LandmarkId>(features.size()), estimate.inliers};
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (inlier[i]) found.landmarks[pairs.features[i]] = pairs.landmarks[i];
   return found;
@@ -115,6 +115,8 @@ void RelocaliseOptions::add_to(ConfigSchema& s) {
         "neighbours of the key frame, whose landmarks are searched then");
   s.add("mapping.relocalise.min_inliers", &min_inliers, {6, 10000}, "landmarks that must agree with the pose");
   s.add("mapping.relocalise.min_share", &min_share, {0, 1}, "share of the landmarks found that must agree");
+  s.add("mapping.relocalise.min_seen_share", &min_seen_share, {0, 1},
+        "share of the landmarks that should be in view that must agree");
 }
 
 std::optional<Relocalisation> relocalise(const Map& map, const PlaceIndex& places, const FrameFeatures& features,

@@ -11,12 +11,13 @@ namespace semvslam {
 
 struct RelocaliseOptions {
   bool enabled = true;
-  int candidates = 5;          // key frames that look most like the frame, tried one after the other
-  int max_distance_bits = 50;  // descriptors farther apart are no match
-  double radius_px = 8;        // search window at level 0 once there is a first pose
-  int neighbours = 15;         // of the key frame, whose landmarks are searched then
-  int min_inliers = 30;        // landmarks that must agree with the pose
-  double min_share = 0.5;      // of those found that must agree
+  int candidates = 5;           // key frames that look most like the frame, tried one after the other
+  int max_distance_bits = 50;   // descriptors farther apart are no match
+  double radius_px = 8;         // search window at level 0 once there is a first pose
+  int neighbours = 15;          // of the key frame, whose landmarks are searched then
+  int min_inliers = 30;         // landmarks that must agree with the pose
+  double min_share = 0.5;       // of those found that must agree
+  double min_seen_share = 0.1;  // of those that should be in view, which must agree
 
   void add_to(ConfigSchema& schema);
 };
@@ -27,7 +28,6 @@ struct Relocalisation {
   SE3 camera_from_world;
   std::vector<LandmarkId> landmarks;  // per feature; invalid = none
   int inliers = 0;
-  int in_view = 0;  // landmarks of the place that should be seen from there
 };
 
 /// The part of the map that is searched.
@@ -40,7 +40,9 @@ struct SearchScope {
 
 /// Looks for a frame in the map by what it looks like, without any idea where the camera is. The index names key
 /// frames, which are compared by a sample of the frame's descriptors; for those that agree best PnP gives a pose
-/// (estimate_pose()), with which the landmarks around are searched, and a robust pose over all of them decides.
+/// (estimate_pose()), with which the landmarks around are searched, and a robust pose over all of them decides. A wrong
+/// pose also finds some dozens of landmarks that agree, on a thing that was moved or looks like another, but few of all
+/// that should be seen.
 std::optional<Relocalisation> relocalise(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
                                          const RelocaliseOptions& options, const SearchScope& scope = {});
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "semvslam/mapping/round_room_test_support.h"
 
@@ -77,6 +78,16 @@ TEST_F(RelocaliseTest, TheRightDescriptorsInTheWrongPlacesAreNoPose) {
   const auto f = look(pose(2.2), 5);
   std::shuffle(f->orb.descriptors.begin(), f->orb.descriptors.end(), room.noise);
   EXPECT_FALSE(find(*f));
+}
+
+TEST_F(RelocaliseTest, AThingOfTheRoomAloneIsNotThePlace) {
+  const auto f = look(pose(7), 5);
+  for (std::size_t i = 0; i < f->size(); ++i)
+    if (std::hypot(f->x_px[i] - 200, f->y_px[i] - 200) > 85)
+      f->orb.descriptors[i] = {room.noise(), room.noise(), room.noise(), room.noise()};
+  const RelocaliseOptions strict = {.min_inliers = 15};
+  EXPECT_FALSE(relocalise(map, places, *f, strict));
+  EXPECT_TRUE(relocalise(map, places, *f, {.min_inliers = 15, .min_seen_share = 0})) << "or it proves nothing";
 }
 
 TEST_F(RelocaliseTest, TheScopeLeavesOutKeyFramesAndWhatTheySee) {

@@ -15,9 +15,13 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-constexpr double kNearestProjection = 0.05;             // metres before the camera
-constexpr double kLeastUsedShare = 0.5;                 // of the features: no more than twice as many are extracted
-constexpr std::size_t kLeastToSearch = 50;              // features by which a lost frame can be found
+constexpr double kNearestProjection = 0.05;  // metres before the camera
+constexpr double kLeastUsedShare = 0.5;      // of the features: no more than twice as many are extracted
+constexpr std::size_t kLeastToSearch = 50;   // features by which a lost frame can be found
+/// After more lost frames than these the camera may be anywhere. From a wrong pose some dozens of landmarks are found
+/// as well, on things that look alike, but few of all that should be in view; at right ones the median is a quarter.
+constexpr int kBrieflyLost = 5;
+constexpr double kFoundAgainShare = 0.1;
 constexpr double kMapJumpM = 0.01, kMapJumpRad = 0.01;  // more than a local bundle adjustment moves the newest frame
 
 }  // namespace
@@ -124,9 +128,9 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
     if (has_velocity_) velocity_ = current_.camera_from_world * last_.camera_from_world.inverse();
     if (may_request && wants_key_frame(output.inliers, frame.id)) output.key_frame = make_request(frame);
     last_ = std::move(current_);
-    lost_ = false;
+    lost_frames_ = 0;
   } else {
-    lost_ = true;
+    ++lost_frames_;
     output.state = TrackingState::kLost;
     if (current_.features->size() >= kLeastToSearch) output.search = SearchRequest{frame.id, current_.features};
     output.camera_from_world = last_.camera_from_world;
@@ -135,7 +139,7 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
 }
 
 bool Tracker::resume(const FoundAgain& found) {
-  if (!lost_) return false;
+  if (lost_frames_ == 0) return false;
   const LocalMap::KeyFramePose& reference = *found.local->find(found.relative.reference);
   last_ = {found.features, found.landmarks, found.relative.camera_from_reference * reference.camera_from_world};
   last_relative_ = found.relative;
@@ -303,6 +307,7 @@ int Tracker::track_local_map(const RgbdFrame& frame) {
   SE3 refined = current_.camera_from_world;
   const int inliers = estimate_pose(candidates_, refined);
   if (inliers < options_.min_inliers) return inliers;
+  if (lost_frames_ > kBrieflyLost && inliers < kFoundAgainShare * static_cast<double>(queries_.size())) return 0;
   current_.camera_from_world = refined;
   for (std::size_t i = 0; i < candidates_.points.size(); ++i) {
     const auto feature = static_cast<std::size_t>(candidates_.features[i]);

@@ -116,7 +116,8 @@ class Tracker {
   std::shared_ptr<const LocalMap> local_;
   Tracked current_, last_;
   SE3 velocity_;  // current_from_last
-  bool has_velocity_ = false, lost_ = false;
+  bool has_velocity_ = false;
+  int lost_frames_ = 0;  // in a row, up to now
   std::optional<RelativePose> last_relative_;
   bool waiting_for_map_ = false;  // the first request was made
   FrameId last_key_frame_;

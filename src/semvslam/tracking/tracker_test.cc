@@ -71,6 +71,23 @@ TEST_F(TrackerTest, AFrameWithoutFeaturesIsLostAndTheNextGoodOneIsFound) {
   EXPECT_LT((found.camera_from_world * PlaneWorld::world_from_camera(5)).translation().norm(), 0.002);
 }
 
+TEST_F(TrackerTest, LostForLongAPieceOfThePictureElsewhereIsNotWhereItWas) {
+  const auto local = start();
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
+  // A strange wall on which a piece of the known one hangs, moved aside.
+  const RgbdFrame known = world.render(1);
+  RgbdFrame strange = world.render(2);
+  cv::rotate(strange.gray, strange.gray, cv::ROTATE_180);
+  known.gray(cv::Rect(120, 90, 120, 88)).copyTo(strange.gray(cv::Rect(130, 90, 120, 88)));
+  known.depth(cv::Rect(120, 90, 120, 88)).copyTo(strange.depth(cv::Rect(130, 90, 120, 88)));
+  RgbdFrame dark = world.render(2);
+  dark.gray.setTo(0);
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(tracker.step(dark, nullptr, local, false).state, TrackingState::kLost);
+  for (int i = 0; i < 6; ++i) ASSERT_EQ(tracker.step(dark, nullptr, local, false).state, TrackingState::kLost);
+  EXPECT_EQ(tracker.step(strange, nullptr, local, false).state, TrackingState::kLost);
+  EXPECT_EQ(tracker.step(world.render(3), nullptr, local, false).state, TrackingState::kTracking);
+}
+
 TEST_F(TrackerTest, DescriptorsAloneBridgeAJumpThatNoPredictionCovers) {
   const auto local = start();
   ASSERT_EQ(tracker.step(world.render(1), nullptr, local, false).state, TrackingState::kTracking);
