@@ -1,6 +1,6 @@
 #include "semvslam/apps/truth_masks.h"
 
-#include "semvslam/dynamic/mask_fit.h"
+#include "semvslam/geometry/mask_growth.h"
 #include "semvslam/geometry/mask_lookup.h"
 #include "semvslam/semantic/folder_segmenter.h"
 

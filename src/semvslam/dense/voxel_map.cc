@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "semvslam/geometry/depth_image.h"
+#include "semvslam/geometry/mask_growth.h"
 
 namespace semvslam {
 namespace {
@@ -159,9 +160,8 @@ cv::Mat VoxelMap::usable_depth(const cv::Mat& depth_m, const cv::Mat& moving) co
     }
   }
   if (!moving.empty()) {
-    cv::Mat wide;
-    const int side = 2 * options_.margin_px + 1;
-    cv::dilate(moving, wide, cv::Mat::ones(side, side, CV_8UC1));
+    cv::Mat wide = moving.clone();
+    grow_mask(wide, options_.margin_px);
     out.setTo(0, wide);
   }
   return out;

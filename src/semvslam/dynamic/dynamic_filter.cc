@@ -9,6 +9,7 @@
 #include "semvslam/dynamic/mover_reach.h"
 #include "semvslam/geometry/depth_image.h"
 #include "semvslam/geometry/image_pool.h"
+#include "semvslam/geometry/mask_growth.h"
 #include "semvslam/geometry/mask_lookup.h"
 
 namespace semvslam {

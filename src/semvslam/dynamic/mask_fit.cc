@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "semvslam/geometry/depth_image.h"
+#include "semvslam/geometry/mask_growth.h"
 
 namespace semvslam {
 namespace {
@@ -16,16 +17,6 @@ constexpr float kLeastShare = 0.02f;  // of the window that must be thing with d
 int next_set(const std::uint8_t* row, int from, int end) {
   const void* at = std::memchr(row + from, 255, static_cast<std::size_t>(end - from));
   return at != nullptr ? static_cast<int>(static_cast<const std::uint8_t*>(at) - row) : end;
-}
-
-cv::Mat square(int reach_px) { return cv::getStructuringElement(cv::MORPH_RECT, {2 * reach_px + 1, 2 * reach_px + 1}); }
-
-/// The part of the image within reach of a pixel that is set; empty where none is.
-cv::Rect reach_of(const cv::Mat& mask, int reach_px) {
-  const cv::Rect set = cv::boundingRect(mask);
-  if (set.empty()) return {};
-  const cv::Point reach(reach_px, reach_px);
-  return cv::Rect(set.tl() - reach, set.br() + reach) & cv::Rect(cv::Point(), mask.size());
 }
 
 }  // namespace
@@ -50,9 +41,9 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
     for (int x = 0; x < window.width; ++x) things[x] = from[2 * x] != 0 ? 255 : 0;
   }
   // The thing's own depth comes from its core: the rim of a mask may lie on what is behind it.
-  cv::Mat core, widest;
-  cv::erode(thing, core, square(half_band));
-  cv::dilate(thing, widest, square(half_band));
+  cv::Mat core(thing.size(), CV_8UC1), widest = thing.clone();
+  without_rim(thing, half_band, core);
+  grow_mask(widest, half_band);
   for (int y = 0; y < window.height; ++y) {
     const std::uint8_t* cores = core.ptr<std::uint8_t>(y);
     const float* depths = depth_m.ptr<float>(y);
@@ -80,34 +71,6 @@ void fit_to_depth(cv::Mat& mask, const cv::Mat& depth, float metres_per_unit, co
         for (int u = to_x; u < end_x; ++u) mask.at<std::uint8_t>(v, u) = belongs ? 255 : 0;
     }
   }
-}
-
-void grow_mask(cv::Mat& mask, int reach_px) {
-  if (reach_px <= 0) return;
-  const cv::Rect set = reach_of(mask, reach_px);
-  if (set.empty()) return;
-  cv::Mat part = mask(set);
-  cv::dilate(part, part, square(reach_px));
-}
-
-void add_grown(cv::Mat& target, const cv::Mat& mask, int reach_px) {
-  const cv::Rect set = mask.empty() ? cv::Rect() : reach_of(mask, reach_px);
-  if (set.empty()) return;
-  cv::Mat grown, part = target(set);
-  cv::dilate(mask(set), grown, square(reach_px));
-  cv::bitwise_or(part, grown, part);
-}
-
-void without_rim(const cv::Mat& mask, int rim_px, cv::Mat& inside) {
-  if (rim_px <= 0) {
-    mask.copyTo(inside);
-    return;
-  }
-  inside.setTo(0);
-  const cv::Rect set = reach_of(mask, rim_px);
-  if (set.empty()) return;
-  cv::Mat part = inside(set);
-  cv::erode(mask(set), part, square(rim_px));
 }
 
 }  // namespace semvslam
