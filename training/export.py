@@ -7,6 +7,7 @@ import argparse
 import hashlib
 import json
 import os
+import zlib
 
 import numpy as np
 import torch
@@ -161,35 +162,36 @@ def quantise(out, pictures):
     ov.save_model(q, os.path.join(out, TRUNK_INT8), compress_to_fp16=True)
 
 
-def round_weights(path):
-    """Weights with the 7 bits of mantissa that bfloat16 has, as which fast processors take them anyway: files pack to a third."""
+def change_weights(path, change):
+    """Every float32 array of the graph becomes what `change` makes of it."""
     import onnx
     from onnx import numpy_helper
     m = onnx.load(path)
     for i in m.graph.initializer:
         w = numpy_helper.to_array(i)
         if w.dtype == np.float32:
-            bits = w.view(np.uint32).astype(np.uint64)
-            bits = (bits + 0x7FFF + ((bits >> 16) & 1)) & 0xFFFF0000          # to the nearest, ties to even
-            i.CopyFrom(numpy_helper.from_array(bits.astype(np.uint32).view(np.float32), i.name))
+            i.CopyFrom(numpy_helper.from_array(change(w).astype(np.float32), i.name))
     onnx.save(m, path)
+
+
+def round_weights(path):
+    """Weights with the 7 bits of mantissa that bfloat16 has, as which fast processors take them anyway: files pack to a third."""
+    def rounded(w):
+        bits = w.view(np.uint32).astype(np.uint64)
+        bits = (bits + 0x7FFF + ((bits >> 16) & 1)) & 0xFFFF0000              # to the nearest, ties to even
+        return bits.astype(np.uint32).view(np.float32)
+    change_weights(path, rounded)
 
 
 def coarse_weights(path, bits):
     """Weights on a grid, whose step is a power of two of each output channel's own: files pack smaller still. Returns that size."""
-    import zlib
-
-    import onnx
-    from onnx import numpy_helper
-    m = onnx.load(path)
-    for i in m.graph.initializer:
-        w = numpy_helper.to_array(i)
-        if w.dtype != np.float32 or w.ndim < 2:
-            continue
+    def on_grid(w):
+        if w.ndim < 2:
+            return w
         rows = w.reshape(len(w), -1)
         step = 2.0 ** np.ceil(np.log2(np.maximum(np.abs(rows).max(1, keepdims=True), 1e-12) / (2 ** (bits - 1) - 1)))
-        i.CopyFrom(numpy_helper.from_array((np.round(rows / step) * step).astype(np.float32).reshape(w.shape), i.name))
-    onnx.save(m, path)
+        return (np.round(rows / step) * step).reshape(w.shape)
+    change_weights(path, on_grid)
     with open(path, "rb") as f:
         return len(zlib.compress(f.read(), 9))
 

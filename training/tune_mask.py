@@ -20,7 +20,7 @@ from torchvision.ops import roi_align
 
 import export
 import infer
-from segnet import boxes, cost, dataset, losses, model
+from segnet import boxes, cost, dataset, exported, losses, model
 
 PERSON, MOVED = 1, 0.06       # class; standard deviation of moved true boxes' sides, as a share of width or height
 SURE = 0.3                    # of the boxes that the network finds, those that it gives at least this
@@ -29,9 +29,7 @@ CANVAS = (480, 640)
 
 def plain_mask_head(folder):
     """The head with the exported weights; batch normalisation was folded into them and is not brought back."""
-    import onnx
-    from onnx import numpy_helper
-    stored = {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in onnx.load(os.path.join(folder, "mask.onnx")).graph.initializer}
+    stored = exported.weights(folder, "mask")
     head = export.fuse(model.MaskHead().eval())
     for name, module in head.named_modules():
         if not hasattr(module, "weight"):
@@ -110,10 +108,15 @@ def gather(o, data, most):
     return [torch.cat(p) for p in zip(*parts)]
 
 
+def mixed(person, semantic):
+    """A person's mask as it is pasted, before the threshold."""
+    return (1 - infer.SEMANTIC_SHARE) * person + infer.SEMANTIC_SHARE * semantic.float()
+
+
 def loss_of(head, features, semantic, masks, labels, worth):
     m = head(features.float().permute(0, 3, 1, 2)).float().sigmoid()
     person = labels == PERSON
-    p = torch.where(person[:, None, None], (1 - infer.SEMANTIC_SHARE) * m[:, 0] + infer.SEMANTIC_SHARE * semantic.float(), m[:, 1]).flatten(1)
+    p = torch.where(person[:, None, None], mixed(m[:, 0], semantic), m[:, 1]).flatten(1)
     # Seen is what lies above the threshold: p is bent so that it is even odds there.
     p = p.clamp(1e-4, 1 - 1e-4)
     even = torch.where(person, infer.MASK_THRESHOLD, 0.5)[:, None]
@@ -131,7 +134,7 @@ def seen_iou(head, held):
         for i in torch.arange(len(labels)).split(256):
             i = i[labels[i] == PERSON]
             m = head(features[i].float().permute(0, 3, 1, 2)).sigmoid()[:, 0]
-            p = ((1 - infer.SEMANTIC_SHARE) * m + infer.SEMANTIC_SHARE * semantic[i].float() >= infer.MASK_THRESHOLD).flatten(1)
+            p = (mixed(m, semantic[i]) >= infer.MASK_THRESHOLD).flatten(1)
             y = (masks[i] >= 128).flatten(1)
             total += ((p & y).sum(1) / (p | y).sum(1).clamp(min=1)).sum().item()
             count += len(i)

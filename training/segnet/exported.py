@@ -8,23 +8,29 @@ from torch import nn
 GRAPHS = (("trunk", "net.", ""), ("box", "head.", "box."), ("mask", "head.", "mask."))       # file, its prefix, ours
 
 
+def weights(folder, graph):
+    """Of one of the exported graphs, by the names that they have there."""
+    import onnx
+    from onnx import numpy_helper
+    initializers = onnx.load(os.path.join(folder, graph + ".onnx")).graph.initializer
+    return {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in initializers}
+
+
 def load(net, folder, names, batches):
     """Fills net from the ONNX graphs of export.py in `folder`.
 
     Batch normalisation was folded into the convolutions. Each layer gets back the statistics that its input has over
     `batches` (as the loader gives them), with weights so that nothing changes: training then starts where it ended.
     """
-    import onnx
-    from onnx import numpy_helper
     with open(os.path.join(folder, "model.json")) as f:
         classes = json.load(f)["classes"]
     if classes != names:
         raise ValueError(f"{folder}: was trained for {', '.join(classes)}; the data has {', '.join(names)}")
     stored = {}
     for graph, theirs, ours in GRAPHS:
-        for i in onnx.load(os.path.join(folder, graph + ".onnx")).graph.initializer:
-            if i.name.startswith(theirs):
-                stored[ours + i.name[len(theirs):]] = torch.from_numpy(numpy_helper.to_array(i).copy())
+        for name, values in weights(folder, graph).items():
+            if name.startswith(theirs):
+                stored[ours + name[len(theirs):]] = values
     modules = dict(net.named_modules())
     norms = []
     for name, module in modules.items():

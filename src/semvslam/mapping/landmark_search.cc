@@ -4,6 +4,25 @@
 
 namespace semvslam {
 
+KeyFrameId first_recent(const Map& map, KeyFrameId id, int newest) {
+  auto first = map.key_frames().find(id);
+  for (int i = 0; i < newest && first != map.key_frames().begin(); ++i) --first;
+  return first->first;
+}
+
+std::vector<LandmarkId> landmarks_before(const Map& map, const std::vector<KeyFrameId>& key_frames, KeyFrameId before) {
+  std::vector<LandmarkId> landmarks = map.landmarks_of(key_frames);
+  std::erase_if(landmarks, [&](LandmarkId l) { return map.landmark(l)->observations.back().key_frame >= before; });
+  return landmarks;
+}
+
+std::vector<Descriptor> landmark_descriptors(const KeyFrame& key_frame) {
+  std::vector<Descriptor> descriptors;
+  for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
+    if (key_frame.landmarks[i].valid()) descriptors.push_back(key_frame.features->orb.descriptors[i]);
+  return descriptors;
+}
+
 LandmarkMatches pair_up(const Map& map, const FrameFeatures& frame, const std::vector<LandmarkId>& sources,
                         const std::vector<Match>& matches) {
   LandmarkMatches out;

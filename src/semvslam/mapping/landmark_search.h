@@ -19,6 +19,13 @@ struct LandmarkMatches {
   std::size_t size() const { return landmarks.size(); }
 };
 
+/// The first of so many newest key frames up to `id`: what none of them sees belongs to an earlier visit.
+KeyFrameId first_recent(const Map& map, KeyFrameId id, int newest);
+/// Landmarks of the key frames that no key frame from `before` on sees.
+std::vector<LandmarkId> landmarks_before(const Map& map, const std::vector<KeyFrameId>& key_frames, KeyFrameId before);
+/// Descriptors of the features that are landmarks.
+std::vector<Descriptor> landmark_descriptors(const KeyFrame& key_frame);
+
 /// @param sources the landmark of each query.
 LandmarkMatches pair_up(const Map& map, const FrameFeatures& frame, const std::vector<LandmarkId>& sources,
                         const std::vector<Match>& matches);

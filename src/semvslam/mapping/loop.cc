@@ -4,6 +4,8 @@
 #include <numbers>
 #include <utility>
 
+#include "semvslam/mapping/landmark_search.h"
+
 namespace semvslam {
 namespace {
 
@@ -49,10 +51,8 @@ std::optional<Revisit> LoopFinder::find(const Map& map, const PlaceIndex& places
 }
 
 std::optional<Revisit> LoopFinder::candidate(const Map& map, const PlaceIndex& places, KeyFrameId id) const {
-  auto first_recent = map.key_frames().find(id);
-  for (int i = 0; i < options_.recent_key_frames && first_recent != map.key_frames().begin(); ++i) --first_recent;
-  if (first_recent == map.key_frames().begin()) return std::nullopt;
-  SearchScope scope{first_recent->first};
+  SearchScope scope{first_recent(map, id, options_.recent_key_frames)};
+  if (scope.before == map.key_frames().begin()->first) return std::nullopt;  // nothing is earlier
   for (const Covisible& c : map.covisible(id, kConnected)) scope.apart_from.push_back(c.key_frame);
   const std::optional<Relocalisation> place = relocalise(map, places, *map.key_frame(id)->features,
                                                          {.candidates = options_.candidates,

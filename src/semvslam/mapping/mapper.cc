@@ -5,6 +5,7 @@
 #include <unordered_set>
 
 #include "semvslam/map/landmark_view.h"
+#include "semvslam/mapping/landmark_search.h"
 
 namespace semvslam {
 namespace {
@@ -31,7 +32,7 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
   cull_landmarks(id);
   create_landmarks(id);
   times_.create_ms = lap_ms(lap);
-  remember_place(id);
+  places_.add(id, landmark_descriptors(*map_.key_frame(id)));
   const int revisits = revisits_;
   if (options_.revisit.enabled) {
     if (const std::optional<Revisit> revisit = find_revisit(map_, id, options_.revisit))
@@ -78,14 +79,6 @@ void Mapper::create_landmarks(KeyFrameId id) {
     const Eigen::Vector3d in_world = world_from_camera * map_.model().back_project(features, i);
     young_.push_back(map_.add_landmark(in_world, id, static_cast<std::uint32_t>(i)));
   }
-}
-
-void Mapper::remember_place(KeyFrameId id) {
-  const KeyFrame& key_frame = *map_.key_frame(id);
-  std::vector<Descriptor> descriptors;
-  for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
-    if (key_frame.landmarks[i].valid()) descriptors.push_back(key_frame.features->orb.descriptors[i]);
-  places_.add(id, descriptors);
 }
 
 void Mapper::cull_landmarks(KeyFrameId newest) {

@@ -79,7 +79,6 @@ class Mapper {
  private:
   KeyFrameId insert(const NewKeyFrame& key_frame);
   void create_landmarks(KeyFrameId id);
-  void remember_place(KeyFrameId id);
   void cull_landmarks(KeyFrameId newest);
   std::vector<KeyFrameId> fusion_partners(KeyFrameId id) const;
   void fuse_with_neighbours(KeyFrameId id);

@@ -28,7 +28,7 @@ bool among(const std::vector<KeyFrameId>& key_frames, KeyFrameId id) {
 std::vector<KeyFrameId> most_alike(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
                                    const RelocaliseOptions& options, const SearchScope& scope) {
   const auto candidates = static_cast<std::size_t>(options.candidates);
-  std::vector<Descriptor> sample, seen;
+  std::vector<Descriptor> sample;
   const std::size_t step = std::max<std::size_t>(1, features.size() / kSample);
   for (std::size_t i = 0; i < features.size(); i += step) sample.push_back(features.orb.descriptors[i]);
   std::vector<std::pair<std::size_t, KeyFrameId>> votes;
@@ -41,11 +41,7 @@ std::vector<KeyFrameId> most_alike(const Map& map, const PlaceIndex& places, con
     if (!scope.apart_from.empty() && std::ranges::any_of(map.covisible(place.key_frame, kLeastShared),
                                                          [&](auto& c) { return among(scope.apart_from, c.key_frame); }))
       continue;
-    const KeyFrame& key_frame = *map.key_frame(place.key_frame);
-    seen.clear();
-    for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i)
-      if (key_frame.landmarks[i].valid()) seen.push_back(key_frame.features->orb.descriptors[i]);
-    match_brute_force(sample, seen, matching(options), matches);
+    match_brute_force(sample, landmark_descriptors(*map.key_frame(place.key_frame)), matching(options), matches);
     if (matches.size() >= kLeastVotes) votes.emplace_back(matches.size(), place.key_frame);
   }
   std::sort(votes.rbegin(), votes.rend());  // of equal ones the newer first
@@ -61,10 +57,7 @@ std::vector<LandmarkId> landmarks_around(const Map& map, KeyFrameId id, int neig
     if (key_frames.size() > static_cast<std::size_t>(neighbours)) break;
     if (c.key_frame < scope.before) key_frames.push_back(c.key_frame);
   }
-  std::vector<LandmarkId> landmarks = map.landmarks_of(key_frames);
-  std::erase_if(landmarks,
-                [&](LandmarkId l) { return map.landmark(l)->observations.back().key_frame >= scope.before; });
-  return landmarks;
+  return landmarks_before(map, key_frames, scope.before);
 }
 
 /// By descriptors alone.

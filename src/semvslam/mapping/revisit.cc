@@ -95,14 +95,11 @@ double median_shift_px(const Map& map, KeyFrameId id, const Revisit& revisit) {
 
 std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options) {
   const KeyFrame& key_frame = *map.key_frame(id);
-  auto first_recent = map.key_frames().find(id);
-  for (int i = 0; i < options.recent_key_frames && first_recent != map.key_frames().begin(); ++i) --first_recent;
-  const std::vector<KeyFrameId> earlier = earlier_key_frames(map, id, first_recent->first, options);
+  const KeyFrameId recent = first_recent(map, id, options.recent_key_frames);
+  const std::vector<KeyFrameId> earlier = earlier_key_frames(map, id, recent, options);
   if (earlier.empty()) return std::nullopt;
 
-  std::vector<LandmarkId> landmarks = map.landmarks_of(earlier);
-  std::erase_if(landmarks,
-                [&](LandmarkId l) { return map.landmark(l)->observations.back().key_frame >= first_recent->first; });
+  const std::vector<LandmarkId> landmarks = landmarks_before(map, earlier, recent);
   const LandmarkMatches pairs =
       search_landmarks(map, *key_frame.features, key_frame.camera_from_world, landmarks, options.radius_px,
                        {.max_distance = 50, .ratio = 0.8f, .check_rotation = false});
