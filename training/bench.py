@@ -4,8 +4,6 @@
 usage: bench.py MODEL_DIR IMAGE [--threads 1 2] [--precision f32]
 """
 import argparse
-import json
-import os
 import time
 
 import cv2
@@ -34,17 +32,18 @@ def main():
     a.add_argument("--size", help="of the network's input, height x width")
     a.add_argument("--repeats", type=int, default=40)
     o = a.parse_args()
-    with open(os.path.join(o.models, "model.json")) as f:
-        m = json.load(f)
-    files = {"trunk": m["trunk_int8" if o.int8 else "trunk"], "box": m["box"], "mask": m["mask"],
-             "size": infer.size_of(o.size)}
     bgr = cv2.imread(o.image)
     for threads in o.threads:
-        s = infer.Segmenter(infer.OpenVino(o.models, threads, o.precision, **files))
+        s, m = infer.open_model(o.models, threads, o.precision, o.int8, infer.size_of(o.size))
         x = np.zeros((1, 3, *s.g.size), np.float32)
         boxes, masks = np.zeros((infer.PROPOSALS, 7, 7, 96), np.float32), np.zeros((4, 14, 14, 96), np.float32)
-        for name, call in (("trunk", lambda: s.g.trunk(x)), (f"box head, {infer.PROPOSALS} regions", lambda: s.g.box(boxes)),
-                           ("mask head, 4 regions", lambda: s.g.mask(masks))):
+        calls = {"trunk": lambda: s.g.trunk(x), f"box head, {infer.PROPOSALS} regions": lambda: s.g.box(boxes),
+                 "mask head, 4 regions": lambda: s.g.mask(masks)}
+        if s.g.refines:
+            side = infer.REFINE_SIDE
+            logits, fine = np.zeros((4, side, side), np.float32), np.zeros((4, side, side, m["fine_channels"]), np.float32)
+            calls["refinement, 4 regions"] = lambda: s.g.refine(logits, fine)
+        for name, call in calls.items():
             call()
             print(f"{threads} threads  {name:22} {laps(call, o.repeats)}", flush=True)
         print(f"{threads} threads  {'all, this reference':22} {laps(lambda: s(bgr, 0.5), 10)}", flush=True)

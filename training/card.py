@@ -55,7 +55,7 @@ def main():
     rows = [r for r in runs[-1] if "all" in r]
     steps, seen = (sum(max(r[k] for r in run if k in r) for run in runs) for k in ("step", "seen"))
     last_seen = max(r["seen"] for r in rows)
-    c, head = s["coco"], m["training"]["mask_head"]
+    c, head, refine = s["coco"], m["training"]["mask_head"], m["training"]["refine"]
     size = m["input"]
     out = f"""# The segmentation network
 
@@ -65,7 +65,7 @@ def main():
 | file | what |
 |---|---|
 | `model.json` | describes the graphs; what the program reads first |
-| `trunk.onnx`, `box.onnx`, `mask.onnx` | the three graphs, float32; tensors and every step after them: `training/README.md` |
+| `trunk.onnx`, `box.onnx`, `mask.onnx`, `refine.onnx` | the four graphs, float32; tensors and every step after them: `training/README.md` |
 | `trunk.int8.xml`, `trunk.int8.bin` | the first graph in eight bits, for OpenVINO on processors without fast 16-bit floats |
 | `scores.json`, `training_log.jsonl` | what `evaluate.py` measured; losses during the training |
 | `golden/` | a synthetic picture, what the reference inference makes of it, a frame of our renderer (`people.jpg`), COCO scoring cases: for tests |
@@ -91,7 +91,9 @@ leading seven. The graphs' weights have seven bits of mantissa, as bfloat16.
 
 Then the mask head alone went on, and got a fourth layer, on the features of {head['objects']} objects in augmented pictures, a third of them
 rendered ({head['steps']} steps; `tune_mask.py`): mean IoU of persons' masks in other pictures of that kind {head['held_out_iou'][0]:.3f} before, {head['held_out_iou'][1]:.3f} after.
-Its weights lie on a grid of seven bits.
+Its weights lie on a grid of seven bits, as do those of the last graph, the refinement of masks with the backbone's features at stride 4. That
+was trained on {refine['objects']} objects of the same kinds of pictures ({refine['steps']} steps; `tune_refine.py`): mean IoU of persons' masks in other pictures,
+with a margin around their boxes, {refine['held_out_iou'][0]:.3f} before, {refine['held_out_iou'][1]:.3f} after.
 
 ## Scores (training/evaluate.py, OpenVINO in float32; person pixels at score >= {c['score_threshold']})
 Held-out pictures drawn by people (`val.json`, {c['images']} images), seen 768 px wide, as `segment` and `eval-seg` do:
@@ -130,8 +132,8 @@ The sequences cannot have been.
 
 ## Limits
 Not all targets on the held-out pictures are reached (crowds, small and unusual persons; false persons on pictures without any; with so few
-pictures one of them moves the pixel IoU by some 0.05), nor those on most rendered sequences (of seated persons the legs between those of
-desk and chairs are missing); those on the composed sequences are.
+pictures one of them moves the pixel IoU by some 0.05), nor the recall on one of the rendered sequences (of seated persons the legs between
+those of desk and chairs are missing); those on the others and on the composed sequences are.
 Trained for persons; the other 21 classes have few drawn masks and are weak. Small persons (under about 40 px) are often missed. Two
 detections of one person, or a chair or clothes on a hook taken for a person, occur: `dynamic` checks with motion and depth.
 

@@ -27,7 +27,7 @@ class Torch:
         net, state = export.load(path)
         self.torch, self.size, self.names = torch, size, state["names"]
         self.parts = [export.Trunk(net), export.Box(net), export.Mask(net)]
-        self.outs = export.TRUNK_OUT
+        self.outs, self.refines = export.TRUNK_OUT, False
 
     def call(self, k, x):
         with self.torch.no_grad():
@@ -44,16 +44,14 @@ class Torch:
         return {"masks": self.call(2, x).numpy()}
 
 
-def open_model(path, size, int8=False, threads=2):
+def open_model(path, size, int8=False, threads=2, refine=True):
     size = infer.size_of(size)
     if path.endswith(".pt"):
         t = Torch(path, size or (480, 640))
         return infer.Segmenter(t), t.names
-    with open(os.path.join(path, "model.json")) as f:
-        m = json.load(f)
     # f32, for scores that do not depend on the processor: OpenVINO takes bfloat16 wherever it exists.
-    graphs = infer.OpenVino(path, threads, "f32", trunk=m["trunk_int8" if int8 else "trunk"], box=m["box"], mask=m["mask"], size=size)
-    return infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"]), m["classes"]
+    seg, m = infer.open_model(path, threads, "f32", int8, size, refine)
+    return seg, m["classes"]
 
 
 def iou(a, b):
@@ -169,9 +167,10 @@ def main():
     a.add_argument("--score", type=float, help="least score of a person; default: as the program's, of stills and of sequences")
     a.add_argument("--size", help="of the network's input, height x width; default: as exported, 480x640 for a check point")
     a.add_argument("--int8", action="store_true", help="the trunk in INT8")
+    a.add_argument("--coarse", action="store_true", help="masks as the mask head gives them, not refined")
     a.add_argument("--json")
     o = a.parse_args()
-    seg, names = open_model(o.model, o.size, o.int8)
+    seg, names = open_model(o.model, o.size, o.int8, refine=not o.coarse)
     out = {"model": os.path.basename(os.path.normpath(o.model))}
     if o.coco:
         out["coco"] = score_coco(seg, names, *o.coco, o.score or infer.SURE_OF_STILLS, o.drawn)

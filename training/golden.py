@@ -49,6 +49,8 @@ def formulas():
     (x0, y0, window), _ = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120))
     hint = (((np.arange(48)[:, None] * 5 + np.arange(64)[None] * 3) % 17) / 16).astype(np.float32)
     (_, _, mixed), certainty = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120), 0.48, hint, (2.0, 2.5), 0.5)
+    region = infer.grown(np.array([[-7.3, 20.6, 50.2, 99.5]], np.float32), infer.REFINE_MARGIN)[0]
+    coarse = infer.on_region(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), region, hint, 0.35)
     nb = np.array([[i * 7 % 50, i * 13 % 40, i * 7 % 50 + 30 + i % 5, i * 13 % 40 + 25 + i % 7] for i in range(40)], np.float32)
     ns = np.array([(i * 29 % 41) / 41 for i in range(40)], np.float32)
     ref = np.array([[10, 20, 60, 90], [0, 0, 500, 380]], np.float32)
@@ -61,6 +63,9 @@ def formulas():
                       "row_counts": window.sum(1).tolist(),
                       "mixed": {"about": "semantic: ((5 y + 3 x) mod 17) / 16, 48x64 cells of 8 px, scale 2 and 2.5, share 0.5, threshold 0.48",
                                 "pixels": int(mixed.sum()), "certainty": certainty}},
+            "refine": {"about": "the same mask and semantic map, both in pixels of the input; share 0.35, threshold 0.44", "box": [-7.3, 20.6, 50.2, 99.5],
+                       "region": listed(region), "certainty": infer.mean_inside(coarse, 0.44),
+                       "logits_of_every_5th_row": listed(infer.bent(coarse, 0.44)[::5, ::5], 4)},
             "nms": {"boxes": listed(nb), "scores": listed(ns, 7), "threshold": 0.5, "keep": infer.nms(nb, ns, 0.5, 50).tolist()},
             "decode": {"reference": listed(ref), "deltas": listed(deltas), "height": 384, "width": 512, "boxes": listed(infer.decode(deltas, ref, (384, 512)), 4)}}
 
@@ -71,10 +76,8 @@ def main():
     a.add_argument("out")
     a.add_argument("--precision", default="f32", help="bf16 and f32 differ in the third digit")
     o = a.parse_args()
-    with open(os.path.join(o.models, "model.json")) as f:
-        m = json.load(f)
-    graphs = infer.OpenVino(o.models, 1, o.precision, m["trunk"], m["box"], m["mask"])
-    seg = infer.Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"])
+    seg, m = infer.open_model(o.models, 1, o.precision)
+    graphs = seg.g
     os.makedirs(o.out, exist_ok=True)
     bgr = picture()
     cv2.imwrite(os.path.join(o.out, "picture.png"), bgr)

@@ -23,6 +23,8 @@ GREY = 127
 PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.44     # of persons' masks
+REFINE_SIDE, REFINE_MARGIN = 56, 1 / 14         # cells of a refined mask; what it sees around a box, as a share of its sides
+LEAST_PROBABILITY = 1e-3                        # of a mask's cell, as the refinement sees it
 SURE = 0.45                                     # least score beside a camera: even odds, and a mask as sure as good ones are (0.9)
 SURE_OF_STILLS = 0.55                           # of single pictures: nothing comes after it that would see a false person
 
@@ -87,16 +89,16 @@ def axis(lo, hi, size, cells):
     return i, np.minimum(i + 1, size - 1), np.where(inside, 1 - f, 0), np.where(inside, f, 0)
 
 
-def roi_align(levels, boxes, cells, thresholds):
+def roi_align(levels, boxes, cells, thresholds, strides=STRIDES):
     """levels: [H, W, C] each; boxes [N, 4] in input pixels -> [N, cells, cells, C]."""
     s = np.sqrt(np.maximum((boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1]), 0))
-    level = sum((s >= t).astype(int) for t in thresholds)
+    level = sum(((s >= t).astype(int) for t in thresholds), np.zeros(len(boxes), int))
     out = np.zeros((len(boxes), cells, cells, levels[0].shape[2]), np.float32)
     for l in range(len(thresholds) + 1):
         n = np.nonzero(level == l)[0]
         if not len(n):
             continue
-        f, b = levels[l], boxes[n] / STRIDES[l] - 0.5
+        f, b = levels[l], boxes[n] / strides[l] - 0.5
         i0, i1, a0, a1 = axis(b[:, 1], b[:, 3], f.shape[0], cells)
         j0, j1, b0, b1 = axis(b[:, 0], b[:, 2], f.shape[1], cells)
         v = 0.0
@@ -119,18 +121,12 @@ def bilinear(table, v, u):
     return top * (1 - fv) + low * fv
 
 
-def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share=0.0):
-    """Mask probabilities [28, 28] of a box -> (x0, y0, bool window) of the image, and the mask's certainty.
+def read_mask(prob, box, x, y, semantic=None, scale=(1.0, 1.0), share=0.0):
+    """Mask probabilities [n, n], stretched over a box, at the places x, y [columns], [rows]: bilinear, 0 beyond the cells.
 
-    Bilinear, 0 beyond the 28 x 28 cells. With `semantic` [h, w] at stride 8 the two probabilities are mixed by `share`; certainty is
-    the mean probability of the mask's pixels.
+    With `semantic` [h, w] at stride 8 of the input (`scale`: its pixels per unit of box, x and y) the two are mixed by `share`.
     """
-    x0, y0 = max(0, math.floor(box[0])), max(0, math.floor(box[1]))
-    x1, y1 = min(size[1], math.ceil(box[2])), min(size[0], math.ceil(box[3]))
-    if x1 <= x0 or y1 <= y0:
-        return (0, 0, np.zeros((0, 0), bool)), 0.0
     n = prob.shape[0]
-    x, y = np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5
     u = ((x - box[0]) / max(box[2] - box[0], 1e-3) * n - 0.5).astype(np.float32)
     v = ((y - box[1]) / max(box[3] - box[1], 1e-3) * n - 0.5).astype(np.float32)
     padded = np.zeros((n + 2, n + 2), np.float32)
@@ -139,28 +135,62 @@ def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share
     if semantic is not None:
         s = bilinear(semantic, y * scale[1] / STRIDES[0] - 0.5, x * scale[0] / STRIDES[0] - 0.5)
         p = (1 - share) * p + share * s
-    mask = p >= threshold
-    return (x0, y0, mask), float(p[mask].mean()) if mask.any() else 0.0
+    return p
+
+
+def paste(prob, box, size, threshold=0.5, semantic=None, scale=(1.0, 1.0), share=0.0):
+    """Mask probabilities [n, n] of a box -> (x0, y0, bool window) of the image, and the mask's certainty: the mean probability of
+    its pixels. The mixing: see read_mask."""
+    x0, y0 = max(0, math.floor(box[0])), max(0, math.floor(box[1]))
+    x1, y1 = min(size[1], math.ceil(box[2])), min(size[0], math.ceil(box[3]))
+    if x1 <= x0 or y1 <= y0:
+        return (0, 0, np.zeros((0, 0), bool)), 0.0
+    p = read_mask(prob, box, np.arange(x0, x1) + 0.5, np.arange(y0, y1) + 0.5, semantic, scale, share)
+    return (x0, y0, p >= threshold), mean_inside(p, threshold)
+
+
+def grown(boxes, share):
+    """Boxes [n, 4] with a share of their width and height added on each side."""
+    d = (boxes[:, 2:] - boxes[:, :2]) * np.float32(share)
+    return np.concatenate((boxes[:, :2] - d, boxes[:, 2:] + d), 1)
+
+
+def bent(p, threshold):
+    """Logits that are 0 at the threshold."""
+    p = np.clip(p, LEAST_PROBABILITY, 1 - LEAST_PROBABILITY)
+    return (np.log(p / (1 - p)) - math.log(threshold / (1 - threshold))).astype(np.float32)
+
+
+def on_region(prob, box, region, semantic=None, share=0.0):
+    """The mask at the cells' centres of the region, [REFINE_SIDE, REFINE_SIDE]. Everything in pixels of the network's input."""
+    at = lambda low, high: low + (high - low) / REFINE_SIDE * (np.arange(REFINE_SIDE, dtype=np.float32) + 0.5)
+    return read_mask(prob, box, at(region[0], region[2]), at(region[1], region[3]), semantic, share=share)
+
+
+def mean_inside(p, threshold):
+    inside = p >= threshold
+    return float(p[inside].mean()) if inside.any() else 0.0
 
 
 class OpenVino:
-    """The three exported graphs. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
+    """The exported graphs. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
 
-    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx", size=None):
+    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx", refine=None, size=None):
         import openvino as ov
         core = ov.Core()
         options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1}
         if precision:
             options["INFERENCE_PRECISION_HINT"] = precision
-        models = [core.read_model(os.path.join(folder, f)) for f in (trunk, box, mask)]
+        models = [core.read_model(os.path.join(folder, f)) for f in (trunk, box, mask, refine) if f]
         if size:
             models[0].reshape([1, 3, *size])
         self.graphs = [core.compile_model(m, "CPU", options).create_infer_request() for m in models]
         self.size = tuple(self.graphs[0].get_compiled_model().input(0).shape)[2:]
+        self.refines = refine is not None
 
-    def run(self, graph, x):
+    def run(self, graph, *inputs):
         r = self.graphs[graph]
-        r.infer([x], share_inputs=True)
+        r.infer(inputs, share_inputs=True)
         return {p.get_any_name(): r.get_tensor(p).data for p in r.get_compiled_model().outputs}
 
     def trunk(self, x):
@@ -172,10 +202,22 @@ class OpenVino:
     def mask(self, x):
         return self.run(2, x)
 
+    def refine(self, logits, features):
+        return self.run(3, logits, features)
+
+
+def open_model(folder, threads=2, precision=None, int8=False, size=None, refine=True):
+    """A segmenter with what model.json of the folder says, and that. refine: masks are refined where the model can."""
+    with open(os.path.join(folder, "model.json")) as f:
+        m = json.load(f)
+    graphs = OpenVino(folder, threads, precision, m["trunk_int8" if int8 else "trunk"], m["box"], m["mask"],
+                      m.get("refine") if refine else None, size)
+    return Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"], m.get("fine_stride"), m.get("refine_margin")), m
+
 
 class Segmenter:
-    def __init__(self, graphs, share=SEMANTIC_SHARE, threshold=MASK_THRESHOLD, sizes=SIZES):
-        self.g, self.share, self.threshold = graphs, share, threshold
+    def __init__(self, graphs, share=SEMANTIC_SHARE, threshold=MASK_THRESHOLD, sizes=SIZES, fine_stride=None, margin=REFINE_MARGIN):
+        self.g, self.share, self.threshold, self.fine_stride, self.margin = graphs, share, threshold, fine_stride, margin
         H, W = graphs.size
         self.anchors = [anchors(i, H // s, W // s, sizes) for i, s in enumerate(STRIDES)]
         self.times = {}
@@ -196,6 +238,23 @@ class Segmenter:
         ok = (b[:, 2] - b[:, 0] >= 4) & (b[:, 3] - b[:, 1] >= 4) & np.isfinite(s)
         b, s = b[ok], s[ok]
         return b[nms(b, s, RPN_NMS, PROPOSALS)]
+
+    def refine_inputs(self, t, masks, boxes, classes, regions):
+        """The mask head's masks [n, 2, 28, 28] over the boxes -> logits [n, REFINE_SIDE, REFINE_SIDE] over the regions, certainties [n]."""
+        semantic = np.ascontiguousarray(t["semantic"][0, :, :, 0])
+        logits, certain = [], []
+        for m, b, c, r in zip(masks, boxes, classes, regions):
+            threshold = self.threshold if c == 0 else 0.5
+            p = on_region(m[0], b, r, semantic, self.share) if c == 0 else on_region(m[1], b, r)
+            logits.append(bent(p, threshold))
+            certain.append(mean_inside(p, threshold))
+        return np.stack(logits), certain
+
+    def refined(self, t, masks, boxes, classes, regions):
+        """Masks [n, REFINE_SIDE, REFINE_SIDE] over the regions, certainties [n]."""
+        features = roi_align([t["fine"][0]], regions, REFINE_SIDE, (), (self.fine_stride,))
+        logits, certain = self.refine_inputs(t, masks, boxes, classes, regions)
+        return self.g.refine(logits, features)["masks"], certain
 
     def __call__(self, bgr, least=0.05):
         """Instances, best first: class (0 = person), score, box (x0 y0 x1 y1 in the image), window (x0, y0, mask)."""
@@ -230,10 +289,16 @@ class Segmenter:
         t0 = self.lap("mask", t0)
         out = []
         semantic = np.ascontiguousarray(t["semantic"][0, :, :, 0])
+        f = np.array([fx, fy, fx, fy], np.float32)
+        if self.g.refines:
+            regions = grown(b, self.margin)
+            refined, certain = self.refined(t, m, b, c, regions)
+            t0 = self.lap("refine", t0)
         for i in range(len(b)):
-            box = b[i] / np.array([fx, fy, fx, fy], np.float32)
-            box = np.minimum(box, np.array([bgr.shape[1], bgr.shape[0]] * 2, np.float32))
-            if c[i] == 0:                                  # persons: the two branches of the network vote together
+            box = np.minimum(b[i] / f, np.array([bgr.shape[1], bgr.shape[0]] * 2, np.float32))
+            if self.g.refines:
+                window, certainty = paste(refined[i], regions[i] / f, bgr.shape[:2])[0], certain[i]
+            elif c[i] == 0:                                # persons: the two branches of the network vote together
                 window, certainty = paste(m[i, 0], box, bgr.shape[:2], self.threshold, semantic, (fx, fy), self.share)
             else:
                 window, certainty = paste(m[i, 1], box, bgr.shape[:2])
@@ -272,10 +337,7 @@ def main():
     a.add_argument("--score", type=float, default=SURE_OF_STILLS)
     a.add_argument("--threads", type=int, default=2)
     o = a.parse_args()
-    with open(os.path.join(o.models, "model.json")) as f:
-        about = json.load(f)
-    s = Segmenter(OpenVino(o.models, o.threads, trunk=about["trunk"], box=about["box"], mask=about["mask"]),
-                  about["semantic_share"], about["mask_threshold"], about["anchor_sizes"])
+    s, about = open_model(o.models, o.threads)
     for path in o.images:
         bgr = cv2.imread(path)
         if bgr is None:

@@ -24,7 +24,8 @@ class BadInput : public ::testing::TestWithParam<std::string> {
  protected:
   /// A copy of the shipped network to be damaged.
   void copy_model() const {
-    for (const char* name : {"model.json", "trunk.onnx", "box.onnx", "mask.onnx", "trunk.int8.xml", "trunk.int8.bin"})
+    for (const char* name :
+         {"model.json", "trunk.onnx", "box.onnx", "mask.onnx", "refine.onnx", "trunk.int8.xml", "trunk.int8.bin"})
       fs::copy_file(kModels / name, folder_ / name, fs::copy_options::overwrite_existing);
   }
   void edit_model(const std::function<void(nlohmann::json&)>& edit) const {
@@ -46,7 +47,7 @@ class BadInput : public ::testing::TestWithParam<std::string> {
 TEST_P(BadInput, AModelThatIsMissingOrCutOffIsNamed) {
   if (GetParam() == "openvino" && !have_openvino()) GTEST_SKIP() << "built without OpenVINO";
   const std::pair<const char*, std::uintmax_t> cuts[] = {
-      {"trunk.onnx", 4'000'000}, {"trunk.onnx", 0}, {"mask.onnx", 100}};
+      {"trunk.onnx", 4'000'000}, {"trunk.onnx", 0}, {"mask.onnx", 100}, {"refine.onnx", 5000}};
   for (const auto& [graph, bytes] : cuts) {
     copy_model();
     fs::resize_file(folder_ / graph, bytes);

@@ -11,6 +11,10 @@ struct DetectionBox {
   float x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   float width() const { return x1 - x0; }
   float height() const { return y1 - y0; }
+  /// @param share of the width and of the height that is added on each side.
+  DetectionBox grown(float share) const {
+    return {x0 - share * width(), y0 - share * height(), x1 + share * width(), y1 + share * height()};
+  }
 };
 
 /// The anchors of one pyramid level, cell by cell, sizes within a cell, ratios (height / width) within a size.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <span>
 
 #include "semvslam/semantic/detection_boxes.h"
 
@@ -21,9 +22,24 @@ struct SemanticHint {
   float share = 0;  // 0 = the mask alone, 1 = the hint alone
 };
 
-/// Stretches side x side probabilities over a box: bilinear, zero beyond the outermost cells; mixed with the hint where
-/// there is one; inside where >= threshold.
-PastedMask paste_mask(const float* probabilities, int side, const DetectionBox& box, cv::Size image,
-                      float threshold = 0.5f, const SemanticHint* hint = nullptr);
+/// side x side probabilities stretched over a box: bilinear, zero beyond the outermost cells.
+struct MaskGrid {
+  const float* probabilities = nullptr;
+  int side = 0;
+  DetectionBox box;
+};
+
+/// The grid's probabilities at the image's pixels, mixed with the hint where there is one; inside where >= threshold.
+PastedMask paste_mask(const MaskGrid& grid, cv::Size image, float threshold = 0.5f, const SemanticHint* hint = nullptr);
+
+/// The same probabilities at the centres of cells x cells equal parts of a region, row by row.
+void sample_mask(const MaskGrid& grid, const DetectionBox& region, int cells, const SemanticHint* hint, float* out);
+
+/// Mean of the probabilities that are >= threshold; 0 without any.
+float mean_inside(std::span<const float> probabilities, float threshold);
+
+/// Probabilities become logits, shifted so that 0 is at the threshold: where the mask's edge would be if it were
+/// pasted.
+void bend_logits(std::span<float> probabilities, float threshold);
 
 }  // namespace semvslam

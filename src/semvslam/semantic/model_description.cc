@@ -35,6 +35,15 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.box = j.at("box").get<std::string>();
   m.mask = j.at("mask").get<std::string>();
   m.trunk_int8 = j.value("trunk_int8", "");
+  m.refine = j.value("refine", "");
+  if (!m.refine.empty()) {
+    m.fine_stride = integer_at<int>(j, "fine_stride");
+    m.fine_channels = integer_at<int>(j, "fine_channels");
+    m.refine_margin = j.at("refine_margin").get<float>();
+    check(m.fine_stride > 0 && m.fine_stride <= 32, "'fine_stride' is not within 1 .. 32");
+    check(m.fine_channels > 0 && m.fine_channels <= 4096, "'fine_channels' is out of range");
+    check(m.refine_margin >= 0 && m.refine_margin <= 1, "'refine_margin' is not within 0 .. 1");
+  }
   m.input = {integer_at<int>(j.at("input"), "width"), integer_at<int>(j.at("input"), "height")};
   m.pad = integer_at<int>(j.at("input"), "pad");
   m.classes = j.at("classes").get<std::vector<std::string>>();
@@ -49,7 +58,8 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.semantic_share = j.at("semantic_share").get<float>();
   m.mask_threshold = j.at("mask_threshold").get<float>();
   if (const auto cost = j.find("gflops"); cost != j.end())
-    m.gflops = {cost->at("trunk").get<double>(), cost->at("box").get<double>(), cost->at("mask").get<double>()};
+    m.gflops = {cost->at("trunk").get<double>(), cost->at("box").get<double>(),
+                cost->at("mask").get<double>() + cost->value("refine", 0.)};
   check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096,
         "'input' is no usable size");
   check(!m.classes.empty(), "'classes' is empty");
@@ -66,6 +76,8 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   for (const float w : m.box_weights) check(w >= .01f && w <= 1e4f, "'box_weights' must be within 0.01 .. 10000");
   for (const int s : m.strides)
     check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
+  if (!m.refine.empty())
+    check(m.strides.back() % m.fine_stride == 0, "the last of 'strides' is no multiple of 'fine_stride'");
   check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels,
         "too many level thresholds");
 }
@@ -102,7 +114,7 @@ Result<ModelDescription> ModelDescription::read(const std::filesystem::path& fol
                                                    file.string())};
   Result<ModelDescription> m = parse(*text, file.string());
   if (!m) return m;
-  for (const std::string& name : {m->trunk, m->box, m->mask, m->trunk_int8})
+  for (const std::string& name : {m->trunk, m->box, m->mask, m->trunk_int8, m->refine})
     if (!name.empty() && !std::filesystem::is_regular_file(folder / name))
       return Error{ErrorCode::kNotFound,
                    fmt::format("{}: names '{}', which is not in that folder", file.string(), name)};

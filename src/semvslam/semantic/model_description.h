@@ -16,6 +16,7 @@ struct ModelDescription {
 
   std::string name, trunk, box, mask;  // files beside model.json
   std::string trunk_int8;              // the trunk in eight-bit numbers, for OpenVINO; empty = none
+  std::string refine;                  // sharpens masks with the trunk's fine features; empty = none
   cv::Size input;
   int pad = 127;  // value of the pixels that the image does not cover
   std::vector<std::string> classes;
@@ -25,12 +26,14 @@ struct ModelDescription {
   std::array<float, 4> box_weights{};
   std::vector<float> box_levels, mask_levels;
   int channels = 0;
-  float semantic_share = 0;     // weight of the semantic map in a person's mask
-  float mask_threshold = 0.5f;  // of a person's mixed mask
+  float semantic_share = 0;                // weight of the semantic map in a person's mask
+  float mask_threshold = 0.5f;             // of a person's mixed mask
+  int fine_stride = 0, fine_channels = 0;  // of the features that the refinement reads
+  float refine_margin = 0;                 // what it sees around a box, as a share of width and height
 
   /// 10^9 operations (two to a multiply-add) that each graph takes, counted when it was exported; 0 = not known.
   struct Cost {
-    double trunk = 0, box_region = 0, mask_region = 0;
+    double trunk = 0, box_region = 0, mask_region = 0;  // the last with its refinement
     double of_image(int proposals, int masks) const { return trunk + proposals * box_region + masks * mask_region; }
   } gflops;
 

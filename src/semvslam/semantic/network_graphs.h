@@ -24,6 +24,7 @@ struct TrunkOutput {
   /// Probabilities at the finest level's cells, kSemanticChannels a cell: person, other mover, movable.
   std::span<const float> semantic;
   static constexpr int kSemanticChannels = 3;
+  FeatureMap fine;  // for the refinement of masks; no data where the model has none
 };
 
 /// What the box head says of some regions; memory of the graphs, valid until its next call.
@@ -32,13 +33,19 @@ struct BoxHeadOutput {
   std::span<const float> deltas;         // four per region
 };
 
-/// The three parts of a network as some inference library runs them. Not safe for concurrent use.
+/// Where the refinement reads one region from; memory of the graphs. Both are empty where the model has no refinement.
+struct RefineInput {
+  std::span<float> logits;    // of the mask, kRefineSide x kRefineSide, positive = inside
+  std::span<float> features;  // kRefineSide x kRefineSide x fine_channels
+};
+
+/// The parts of a network as some inference library runs them. Not safe for concurrent use.
 class NetworkGraphs {
  public:
   // Regions of one call of the box head (below 96 OpenVINO takes a kernel that makes 64 slower than 100); cells along
   // an edge.
   static constexpr int kBoxBatch = 100, kBoxCells = 7;
-  static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
+  static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2, kRefineSide = 56;
 
   virtual ~NetworkGraphs() = default;
   /// @param image CV_8UC3 BGR of the model's input size.
@@ -49,6 +56,9 @@ class NetworkGraphs {
   /// The same for one region: an image has few. @return kMaskChannels x kMaskSide x kMaskSide probabilities.
   virtual std::span<float> mask_input() = 0;
   virtual Result<std::span<const float>> mask_head() = 0;
+  /// The refinement of one region's mask. @return kRefineSide x kRefineSide probabilities, inside where >= 0.5.
+  virtual RefineInput refine_input() = 0;
+  virtual Result<std::span<const float>> refine_head() = 0;
   virtual std::string description() const = 0;
 };
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "semvslam/semantic/image_input.h"
-#include "semvslam/semantic/mask_paste.h"
 
 namespace semvslam {
 namespace {
@@ -13,6 +12,13 @@ constexpr float kLeastProposalSide = 4, kLeastObjectSide = 2;  // px of the netw
 
 bool finite(std::span<const float> values) {
   return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+}
+
+/// A box of the network's input in the image that was fitted into it; the part on the filling is cut off.
+DetectionBox in_image(const DetectionBox& b, float scale_x, float scale_y, cv::Size image) {
+  const auto width = static_cast<float>(image.width), height = static_cast<float>(image.height);
+  return {std::min(b.x0 / scale_x, width), std::min(b.y0 / scale_y, height), std::min(b.x1 / scale_x, width),
+          std::min(b.y1 / scale_y, height)};
 }
 
 Error not_finite(const char* what) {
@@ -124,41 +130,74 @@ Result<std::vector<NetworkSegmenter::Object>> NetworkSegmenter::classify(const T
   return found;
 }
 
+SemanticHint NetworkSegmenter::semantic_hint(const TrunkOutput& trunk, float scale_x, float scale_y) const {
+  const FeatureMap& finest = trunk.levels[0].features;
+  const auto stride = static_cast<float>(finest.stride);
+  return {trunk.semantic.data(), finest.rows,      finest.columns,       TrunkOutput::kSemanticChannels,
+          scale_x / stride,      scale_y / stride, model_.semantic_share};
+}
+
+Result<NetworkSegmenter::RefinedMask> NetworkSegmenter::refine(const TrunkOutput& trunk, const MaskGrid& mask,
+                                                               float threshold, const SemanticHint* hint) {
+  const DetectionBox region = mask.box.grown(model_.refine_margin);
+  const RefineInput input = graphs_->refine_input();
+  sample_mask(mask, region, NetworkGraphs::kRefineSide, hint, input.logits.data());
+  // Of the mask before: a refined one is surer of itself, but ranks objects no better.
+  const float certainty = mean_inside(input.logits, threshold);
+  bend_logits(input.logits, threshold);
+  roi_align(trunk.fine, model_.fine_channels, region, NetworkGraphs::kRefineSide, input.features.data());
+  const Result<std::span<const float>> refined = graphs_->refine_head();
+  if (!refined) return refined.error();
+  if (!finite(*refined)) return not_finite("refined masks");
+  return RefinedMask{{refined->data(), NetworkGraphs::kRefineSide, region}, certainty};
+}
+
+Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Object& object, float scale_x, float scale_y,
+                                           cv::Size image) {
+  align_region(trunk, object.box, model_.mask_levels, NetworkGraphs::kMaskCells, graphs_->mask_input().data());
+  const Result<std::span<const float>> masks = graphs_->mask_head();
+  if (!masks) return masks.error();
+  constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
+  const bool person = object.class_index == 0;
+  const std::span<const float> mask = masks->subspan(person ? 0 : kPixels, kPixels);  // persons have their own channel
+  if (!finite(mask)) return not_finite("masks");
+  const float threshold = person ? model_.mask_threshold : 0.5f;
+  if (model_.refine.empty()) {
+    const SemanticHint hint = semantic_hint(trunk, scale_x, scale_y);
+    return paste_mask({mask.data(), NetworkGraphs::kMaskSide, in_image(object.box, scale_x, scale_y, image)}, image,
+                      threshold, person ? &hint : nullptr);
+  }
+  const SemanticHint hint = semantic_hint(trunk, 1, 1);
+  Result<RefinedMask> refined =
+      refine(trunk, {mask.data(), NetworkGraphs::kMaskSide, object.box}, threshold, person ? &hint : nullptr);
+  if (!refined) return refined.error();
+  const DetectionBox& b = refined->grid.box;
+  refined->grid.box = {b.x0 / scale_x, b.y0 / scale_y, b.x1 / scale_x, b.y1 / scale_y};
+  PastedMask pasted = paste_mask(refined->grid, image);
+  if (pasted.certainty > 0) pasted.certainty = refined->certainty;
+  return pasted;
+}
+
 Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x,
                               float scale_y, Segmentation& out) {
   const auto lap = timers_["segment.masks"].time();
-  const auto width = static_cast<float>(out.size.width), height = static_cast<float>(out.size.height);
   if (!finite(trunk.semantic)) return not_finite("semantic map");
-  const FeatureMap& finest = trunk.levels[0].features;
-  const auto stride = static_cast<float>(finest.stride);
-  const SemanticHint hint{trunk.semantic.data(), finest.rows,      finest.columns,       TrunkOutput::kSemanticChannels,
-                          scale_x / stride,      scale_y / stride, model_.semantic_share};
-  const std::span<float> input = graphs_->mask_input();
-  constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
   for (const Object& o : objects) {
-    align_region(trunk, o.box, model_.mask_levels, NetworkGraphs::kMaskCells, input.data());
-    const Result<std::span<const float>> masks = graphs_->mask_head();
-    if (!masks) return masks.error();
-    const bool person = o.class_index == 0;
-    const std::span<const float> mask =
-        masks->subspan(person ? 0 : kPixels, kPixels);  // persons have a channel of their own
-    if (!finite(mask)) return not_finite("masks");
-    const DetectionBox box{std::min(o.box.x0 / scale_x, width), std::min(o.box.y0 / scale_y, height),
-                           std::min(o.box.x1 / scale_x, width), std::min(o.box.y1 / scale_y, height)};
-    const PastedMask pasted = paste_mask(mask.data(), NetworkGraphs::kMaskSide, box, out.size,
-                                         person ? model_.mask_threshold : 0.5f, person ? &hint : nullptr);
+    const Result<PastedMask> pasted = paste(trunk, o, scale_x, scale_y, out.size);
+    if (!pasted) return pasted.error();
     // With how sure its mask is (the "maskness" of X. Wang et al., SOLOv2, 2020) the score tells good objects from
     // doubtful ones better than by the box head alone.
-    const float score = o.score * pasted.certainty;
-    if (!(score >= limits_.score) || pasted.certainty == 0) continue;
+    const float score = o.score * pasted->certainty;
+    if (!(score >= limits_.score) || pasted->certainty == 0) continue;
     Instance i;
     i.class_index = o.class_index;
     i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
     i.role = roles_.role(i.class_name);
     i.score = score;
+    const DetectionBox box = in_image(o.box, scale_x, scale_y, out.size);
     i.box = {box.x0, box.y0, box.width(), box.height()};
-    i.window = pasted.window;
-    i.mask = pasted.mask;
+    i.window = pasted->window;
+    i.mask = pasted->mask;
     out.instances.push_back(std::move(i));
   }
   std::stable_sort(out.instances.begin(), out.instances.end(),

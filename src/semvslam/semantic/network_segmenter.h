@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "semvslam/semantic/mask_paste.h"
 #include "semvslam/semantic/network_graphs.h"
 #include "semvslam/semantic/segmenter.h"
 
@@ -34,8 +35,17 @@ class NetworkSegmenter final : public Segmenter {
     int class_index = 0;
     float score = 0;
   };
+  struct RefinedMask {
+    MaskGrid grid;
+    float certainty = 0;  // mean probability of the cells inside
+  };
   Result<std::vector<DetectionBox>> propose(const TrunkOutput& trunk) const;
   Result<std::vector<Object>> classify(const TrunkOutput& trunk, const std::vector<DetectionBox>& proposals);
+  SemanticHint semantic_hint(const TrunkOutput& trunk, float scale_x, float scale_y) const;
+  Result<PastedMask> paste(const TrunkOutput& trunk, const Object& object, float scale_x, float scale_y,
+                           cv::Size image);
+  /// Sharpens a mask of the network's input with the trunk's fine features; what is returned is inside where >= 0.5.
+  Result<RefinedMask> refine(const TrunkOutput& trunk, const MaskGrid& mask, float threshold, const SemanticHint* hint);
   Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y,
               Segmentation& out);
   void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "semvslam/base/temporary_folder_test_support.h"
@@ -40,19 +41,29 @@ class FakeGraphs final : public NetworkGraphs {
     probabilities_.assign(kBoxBatch * (classes_ + 1), 0.f);
     deltas_.assign(kBoxBatch * 4, 0.f);
     masks_.assign(static_cast<std::size_t>(kMaskChannels) * kMaskSide * kMaskSide, 1.f);
+    if (model.refine.empty()) return;
+    const int rows = model.input.height / model.fine_stride, columns = model.input.width / model.fine_stride;
+    fine_.assign(static_cast<std::size_t>(rows) * columns * model.fine_channels, 0.5f);
+    out_.fine = {fine_.data(), rows, columns, model.fine_stride};
+    logits_in_.resize(static_cast<std::size_t>(kRefineSide) * kRefineSide);
+    fine_in_.resize(logits_in_.size() * model.fine_channels);
+    refined_.assign(logits_in_.size(), 1.f);
   }
   Result<TrunkOutput> trunk(const cv::Mat&) override { return out_; }
   std::span<float> box_input() override { return box_in_; }
   Result<BoxHeadOutput> box_head() override { return BoxHeadOutput{probabilities_, deltas_}; }
   std::span<float> mask_input() override { return mask_in_; }
   Result<std::span<const float>> mask_head() override { return std::span<const float>(masks_); }
+  RefineInput refine_input() override { return {logits_in_, fine_in_}; }
+  Result<std::span<const float>> refine_head() override { return std::span<const float>(refined_); }
   std::string description() const override { return "fake"; }
 
   struct Level {
     std::vector<float> features, objectness, deltas;
   };
   std::array<Level, 3> level_;
-  std::vector<float> probabilities_, deltas_, masks_, semantic_;
+  std::vector<float> probabilities_, deltas_, masks_, semantic_, fine_, refined_;
+  std::vector<float> logits_in_, fine_in_;  // what the refinement was given last
 
  private:
   std::size_t classes_;
@@ -75,12 +86,21 @@ ModelDescription small_model() {
   return m;
 }
 
+ModelDescription refining_model() {
+  ModelDescription m = small_model();
+  m.refine = "refine.onnx";
+  m.fine_stride = 4;
+  m.fine_channels = 2;
+  m.refine_margin = 0.25f;
+  return m;
+}
+
 struct Fake {
-  Fake() {
-    auto owned = std::make_unique<FakeGraphs>(small_model());
+  explicit Fake(const ModelDescription& model = small_model()) {
+    auto owned = std::make_unique<FakeGraphs>(model);
     graphs = owned.get();
-    segmenter = std::make_unique<NetworkSegmenter>(std::move(owned), small_model(), NetworkSegmenter::Limits{},
-                                                   RoleTable(), nullptr);
+    segmenter =
+        std::make_unique<NetworkSegmenter>(std::move(owned), model, NetworkSegmenter::Limits{}, RoleTable(), nullptr);
   }
   FakeGraphs* graphs;
   std::unique_ptr<NetworkSegmenter> segmenter;
@@ -102,17 +122,46 @@ TEST(NetworkSegmenter, AnAnchorThatIsSureBecomesAnInstanceInImagePixels) {
   EXPECT_EQ(i.window, cv::Rect(32, 32, 128, 128));
 }
 
+TEST(NetworkSegmenter, ARefinementSeesMoreThanTheBoxAndItsMaskIsWhatIsPasted) {
+  Fake f(refining_model());
+  f.graphs->level_[2].objectness[5] = 9.f;  // a 64 px square around (48, 48): with its margin from 0 to 96
+  f.graphs->probabilities_[1] = 0.8f;
+  f.graphs->semantic_.assign(f.graphs->semantic_.size(), 0.f);
+  constexpr int kSide = NetworkGraphs::kRefineSide;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = kSide / 2; x < kSide; ++x) f.graphs->refined_[static_cast<std::size_t>(y * kSide + x)] = 0.f;
+  const Result<Segmentation> s = f.segmenter->segment(request(cv::Mat(192, 256, CV_8UC3, cv::Scalar::all(0))));
+  ASSERT_TRUE(s) << s.error().message;
+  ASSERT_EQ(s->instances.size(), 1u);
+  EXPECT_EQ(s->instances[0].box, cv::Rect2f(32, 32, 128, 128));  // the object's, not the refinement's
+  const cv::Rect inside = cv::boundingRect(s->instances[0].mask) + s->instances[0].window.tl();
+  EXPECT_NEAR(inside.x, 0, 3);
+  EXPECT_NEAR(inside.br().x, 96, 3);
+  EXPECT_NEAR(inside.y, 0, 3);
+  EXPECT_NEAR(inside.br().y, 192, 3);
+  // The box begins and ends at a sixth of the region.
+  const auto logit = [&](int y, int x) { return f.graphs->logits_in_[static_cast<std::size_t>(y * kSide + x)]; };
+  EXPECT_GT(logit(kSide / 2, kSide / 2), 0.f);
+  EXPECT_GT(logit(kSide / 2, kSide / 6 + 2), 0.f);
+  EXPECT_LT(logit(kSide / 2, kSide / 6 - 2), 0.f);
+  EXPECT_LT(logit(kSide - 1, kSide / 2), 0.f);
+  EXPECT_THAT(f.graphs->fine_in_, ::testing::Each(::testing::FloatNear(0.5f, 1e-5f)));
+}
+
 TEST(NetworkSegmenter, NumbersThatAreNotFiniteAreAnError) {
   const cv::Mat image(96, 128, CV_8UC3, cv::Scalar::all(0));
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  Fake a, b, c;
+  Fake a, b, c, d(refining_model());
   a.graphs->level_[0].objectness[3] = nan;
   b.graphs->level_[1].objectness[3] = 9;
   b.graphs->probabilities_[2] = nan;
   c.graphs->level_[1].objectness[3] = 9;
   c.graphs->probabilities_[1] = 0.9f;
   c.graphs->masks_[0] = nan;
-  for (Fake* f : {&a, &b, &c}) {
+  d.graphs->level_[1].objectness[3] = 9;
+  d.graphs->probabilities_[1] = 0.9f;
+  d.graphs->refined_[7] = nan;
+  for (Fake* f : {&a, &b, &c, &d}) {
     const Result<Segmentation> s = f->segmenter->segment(request(image));
     ASSERT_FALSE(s);
     EXPECT_THAT(s.error().message, HasSubstr("not finite"));
@@ -140,10 +189,27 @@ TEST(ModelDescription, AMissingOrDamagedModelNamesTheFile) {
   }
 }
 
+TEST(ModelDescription, ARefinementThatIsNotDescribedIsAnError) {
+  std::ifstream file(kModels / "model.json");
+  const nlohmann::json shipped = nlohmann::json::parse(file);
+  ASSERT_TRUE(ModelDescription::parse(shipped.dump(), "m"));
+  const auto fault = [&](auto change) {
+    nlohmann::json j = shipped;
+    change(j);
+    const auto parsed = ModelDescription::parse(j.dump(), "m");
+    return parsed ? std::string() : parsed.error().message;
+  };
+  EXPECT_THAT(fault([](auto& j) { j.erase("fine_channels"); }), HasSubstr("fine_channels"));
+  EXPECT_THAT(fault([](auto& j) { j["fine_stride"] = 0; }), HasSubstr("fine_stride"));
+  EXPECT_THAT(fault([](auto& j) { j["fine_stride"] = 7; }), HasSubstr("fine_stride"));
+  EXPECT_THAT(fault([](auto& j) { j["refine_margin"] = -1; }), HasSubstr("refine_margin"));
+  EXPECT_EQ(fault([](auto& j) { j.erase("refine"), j.erase("fine_stride"); }), "");  // a model may do without
+}
+
 TEST(ModelDescription, TheShippedNetworkSaysWhatItCosts) {
   const auto model = ModelDescription::read(kModels);
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_NEAR(model->gflops.of_image(NetworkGraphs::kBoxBatch, 5), 6.71, 0.01);  // training/table2.py
+  EXPECT_NEAR(model->gflops.of_image(NetworkGraphs::kBoxBatch, 5), 7.37, 0.01);  // training/table2.py
 }
 
 TEST(ModelDescription, AnotherWidthKeepsTheShapeOfTheInput) {
@@ -332,6 +398,16 @@ TEST_F(ShippedNetwork, AWrongGraphIsNamed) {
   graphs = make_openvino_graphs(kModels, fewer, "f32", 1);
   ASSERT_FALSE(graphs);
   EXPECT_THAT(graphs.error().message, HasSubstr("'probabilities'"));
+  ModelDescription wider = *model;
+  ++wider.fine_channels;
+  graphs = make_openvino_graphs(kModels, wider, "f32", 1);
+  ASSERT_FALSE(graphs);
+  EXPECT_THAT(graphs.error().message, HasSubstr("'fine'"));
+  swapped = *model;
+  swapped.refine = swapped.box;
+  graphs = make_openvino_graphs(kModels, swapped, "f32", 1);
+  ASSERT_FALSE(graphs);
+  EXPECT_THAT(graphs.error().message, HasSubstr("'logits'"));
 }
 
 }  // namespace

@@ -19,11 +19,19 @@ class OpenCvGraphs final : public NetworkGraphs {
     const int mask_shape[] = {1, kMaskCells, kMaskCells, model.channels};
     box_in_ = cv::Mat::zeros(4, box_shape, CV_32F);
     mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
+    if (!model.refine.empty()) {
+      refine_ = read(folder / model.refine);
+      const int logits_shape[] = {1, kRefineSide, kRefineSide};
+      const int features_shape[] = {1, kRefineSide, kRefineSide, model.fine_channels};
+      logits_in_ = cv::Mat::zeros(3, logits_shape, CV_32F);
+      fine_in_ = cv::Mat::zeros(4, features_shape, CV_32F);
+    }
     // OpenCV knows the shapes for certain only once a graph has run; this also makes the first image as fast as the
     // others.
     check(model.trunk, trunk(cv::Mat::zeros(model.input, CV_8UC3)));
     check(model.box, box_head());
     check(model.mask, mask_head());
+    if (!model.refine.empty()) check(model.refine, refine_head());
   }
 
   Result<TrunkOutput> trunk(const cv::Mat& image) override {
@@ -33,6 +41,7 @@ class OpenCvGraphs final : public NetworkGraphs {
       for (const char* kind : {"p", "objectness", "deltas"})
         for (int l = 3; l < 3 + ModelDescription::kLevels; ++l) names.push_back(fmt::format("{}{}", kind, l));
       names.emplace_back("semantic");
+      if (!model_.refine.empty()) names.emplace_back("fine");
       outputs_.clear();
       trunk_.forward(outputs_, names);
       TrunkOutput out;
@@ -47,7 +56,12 @@ class OpenCvGraphs final : public NetworkGraphs {
       }
       const std::size_t finest =
           static_cast<std::size_t>(model_.input.height / model_.strides[0]) * (model_.input.width / model_.strides[0]);
-      out.semantic = numbers(outputs_.back(), finest * TrunkOutput::kSemanticChannels, names.back());
+      out.semantic = numbers(outputs_[9], finest * TrunkOutput::kSemanticChannels, names[9]);
+      if (!model_.refine.empty()) {
+        const int rows = model_.input.height / model_.fine_stride, columns = model_.input.width / model_.fine_stride;
+        const std::size_t count = static_cast<std::size_t>(rows) * columns * model_.fine_channels;
+        out.fine = {numbers(outputs_[10], count, names[10]).data(), rows, columns, model_.fine_stride};
+      }
       return out;
     });
   }
@@ -71,6 +85,20 @@ class OpenCvGraphs final : public NetworkGraphs {
       mask_.setInput(mask_in_);
       mask_out_ = mask_.forward("masks");
       return numbers(mask_out_, static_cast<std::size_t>(kMaskChannels) * kMaskSide * kMaskSide, "masks");
+    });
+  }
+
+  RefineInput refine_input() override {
+    if (model_.refine.empty()) return {};
+    return {{logits_in_.ptr<float>(), logits_in_.total()}, {fine_in_.ptr<float>(), fine_in_.total()}};
+  }
+
+  Result<std::span<const float>> refine_head() override {
+    return guarded<std::span<const float>>([&] {
+      refine_.setInput(logits_in_, "logits");
+      refine_.setInput(fine_in_, "features");
+      refined_ = refine_.forward("masks");
+      return numbers(refined_, static_cast<std::size_t>(kRefineSide) * kRefineSide, "masks");
     });
   }
 
@@ -110,8 +138,8 @@ class OpenCvGraphs final : public NetworkGraphs {
   }
 
   ModelDescription model_;
-  cv::dnn::Net trunk_, box_, mask_;
-  cv::Mat box_in_, mask_in_, mask_out_;
+  cv::dnn::Net trunk_, box_, mask_, refine_;
+  cv::Mat box_in_, mask_in_, mask_out_, logits_in_, fine_in_, refined_;
   std::vector<cv::Mat> outputs_, box_out_;
 };
 

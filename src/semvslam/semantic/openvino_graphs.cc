@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
 #include <openvino/openvino.hpp>
 
 #if defined(__x86_64__)
@@ -72,11 +73,19 @@ class OpenVinoGraphs final : public NetworkGraphs {
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
     const auto c = static_cast<std::size_t>(model.channels);
-    box_ = load_head(folder / model.box, {kBoxBatch, kBoxCells, kBoxCells, c}, options);
+    box_ = load_graph(folder / model.box, {{"rois", {kBoxBatch, kBoxCells, kBoxCells, c}}}, options);
     probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
     box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
-    mask_ = load_head(folder / model.mask, {1, kMaskCells, kMaskCells, c}, options);
+    mask_ = load_graph(folder / model.mask, {{"rois", {1, kMaskCells, kMaskCells, c}}}, options);
     masks_ = output(mask_, model.mask, "masks", {1, kMaskChannels, kMaskSide, kMaskSide});
+    if (model.refine.empty()) return;
+    constexpr std::size_t kSide = kRefineSide;
+    refine_ = load_graph(
+        folder / model.refine,
+        {{"logits", {1, kSide, kSide}}, {"features", {1, kSide, kSide, static_cast<std::size_t>(model.fine_channels)}}},
+        options);
+    refined_ = output(refine_, model.refine, "masks", {1, kSide, kSide});
+    refine_in_ = {input(refine_, "logits"), input(refine_, "features")};
   }
 
   Result<TrunkOutput> trunk(const cv::Mat& image) override {
@@ -93,8 +102,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
     return trunk_out_;
   }
 
-  std::span<float> box_input() override { return input(box_); }
-  std::span<float> mask_input() override { return input(mask_); }
+  std::span<float> box_input() override { return input(box_, "rois"); }
+  std::span<float> mask_input() override { return input(mask_, "rois"); }
+  RefineInput refine_input() override { return refine_in_; }
 
   Result<BoxHeadOutput> box_head() override {
     if (Status s = run([&] { box_.infer(); }); !s) return s.error();
@@ -104,6 +114,11 @@ class OpenVinoGraphs final : public NetworkGraphs {
   Result<std::span<const float>> mask_head() override {
     if (Status s = run([&] { mask_.infer(); }); !s) return s.error();
     return masks_;
+  }
+
+  Result<std::span<const float>> refine_head() override {
+    if (Status s = run([&] { refine_.infer(); }); !s) return s.error();
+    return refined_;
   }
 
   std::string description() const override {
@@ -128,21 +143,29 @@ class OpenVinoGraphs final : public NetworkGraphs {
     return core().compile_model(m, "CPU", options);
   }
 
-  static void check_input(const std::shared_ptr<ov::Model>& m, const std::string& name,
-                          const ov::PartialShape& wanted) {
-    if (m->inputs().size() != 1 || m->input().get_names().count(name) == 0)
-      throw WrongTensor(fmt::format("expected one input, named '{}'", name));
-    const ov::PartialShape shape = m->input().get_partial_shape();
-    if (!shape.compatible(wanted))
-      throw WrongTensor(
-          fmt::format("input '{}' has the shape {}, expected {}", name, shape.to_string(), wanted.to_string()));
+  using Inputs = std::map<std::string, ov::PartialShape>;
+
+  static void check_inputs(const std::shared_ptr<ov::Model>& m, const Inputs& wanted) {
+    std::vector<std::string> names;
+    for (const auto& [name, shape] : wanted) names.push_back(fmt::format("'{}'", name));
+    for (const auto& [name, shape] : wanted) {
+      const auto& inputs = m->inputs();
+      const auto found =
+          std::find_if(inputs.begin(), inputs.end(), [&](const auto& i) { return i.get_names().contains(name); });
+      if (inputs.size() != wanted.size() || found == inputs.end())
+        throw WrongTensor(fmt::format("expected {} input{}, named {}", wanted.size(), wanted.size() == 1 ? "" : "s",
+                                      fmt::join(names, ", ")));
+      if (const ov::PartialShape own = found->get_partial_shape(); !own.compatible(shape))
+        throw WrongTensor(
+            fmt::format("input '{}' has the shape {}, expected {}", name, own.to_string(), shape.to_string()));
+    }
   }
 
   void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
     try {
       const std::shared_ptr<ov::Model> m = read(file);
       const auto h = static_cast<std::size_t>(model_.input.height), w = static_cast<std::size_t>(model_.input.width);
-      check_input(m, "image", {1, 3, ov::Dimension::dynamic(), ov::Dimension::dynamic()});
+      check_inputs(m, {{"image", {1, 3, ov::Dimension::dynamic(), ov::Dimension::dynamic()}}});
       m->reshape(ov::PartialShape(ov::Shape{1, 3, h, w}));
       ov::preprocess::PrePostProcessor p(m);
       p.input()
@@ -176,21 +199,27 @@ class OpenVinoGraphs final : public NetworkGraphs {
     const auto r = static_cast<std::size_t>(model_.input.height / model_.strides[0]),
                c = static_cast<std::size_t>(model_.input.width / model_.strides[0]);
     trunk_out_.semantic = output(trunk_, trunk_name_, "semantic", {1, r, c, TrunkOutput::kSemanticChannels});
+    if (model_.refine.empty()) return;
+    const int rows = model_.input.height / model_.fine_stride, columns = model_.input.width / model_.fine_stride;
+    const Shape fine{1, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns),
+                     static_cast<std::size_t>(model_.fine_channels)};
+    trunk_out_.fine = {output(trunk_, trunk_name_, "fine", fine).data(), rows, columns, model_.fine_stride};
   }
 
-  static ov::InferRequest load_head(const std::filesystem::path& file, const Shape& shape, const ov::AnyMap& options) {
+  static ov::InferRequest load_graph(const std::filesystem::path& file, const Inputs& inputs,
+                                     const ov::AnyMap& options) {
     try {
       const std::shared_ptr<ov::Model> m = read(file);
-      check_input(m, "rois", ov::PartialShape(ov::Shape(shape)));
-      m->reshape(ov::PartialShape(ov::Shape(shape)));
+      check_inputs(m, inputs);
+      m->reshape(inputs);
       return compile(m, options).create_infer_request();
     } catch (const std::exception& e) {
       throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
     }
   }
 
-  static std::span<float> input(ov::InferRequest& request) {
-    ov::Tensor t = request.get_input_tensor();
+  static std::span<float> input(ov::InferRequest& request, const std::string& name) {
+    ov::Tensor t = request.get_tensor(name);
     return {t.data<float>(), t.get_size()};
   }
 
@@ -212,9 +241,10 @@ class OpenVinoGraphs final : public NetworkGraphs {
 
   ModelDescription model_;
   std::string trunk_name_;
-  ov::InferRequest trunk_, box_, mask_;
+  ov::InferRequest trunk_, box_, mask_, refine_;
   TrunkOutput trunk_out_;
-  std::span<const float> probabilities_, box_deltas_, masks_;
+  std::span<const float> probabilities_, box_deltas_, masks_, refined_;
+  RefineInput refine_in_;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "semvslam/semantic/detection_boxes.h"
@@ -10,6 +11,9 @@ namespace semvslam {
 struct FeatureMap {
   const float* data = nullptr;
   int rows = 0, columns = 0, stride = 1;
+  const float* pixel(int y, int x, int channels) const {
+    return data + (static_cast<std::ptrdiff_t>(y) * columns + x) * channels;
+  }
 };
 
 /// Which level a box is read from: the number of thresholds that sqrt(area) reaches.

@@ -30,6 +30,20 @@ std::vector<float> formula_map(int rows, int columns, int channels) {
   return out;
 }
 
+std::vector<float> formula_mask() {
+  std::vector<float> out;
+  for (int y = 0; y < 28; ++y)
+    for (int x = 0; x < 28; ++x) out.push_back(static_cast<float>((13 * y + 7 * x) % 29) / 28.f);
+  return out;
+}
+
+std::vector<float> formula_hint() {
+  std::vector<float> out;
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) out.push_back(static_cast<float>((5 * y + 3 * x) % 17) / 16.f);
+  return out;
+}
+
 TEST(SegmentationSteps, RoiAlignGivesTheReferencesNumbers) {
   const nlohmann::json wanted = formulas().at("roi_align");
   const std::vector<float> maps[] = {formula_map(48, 64, 4), formula_map(24, 32, 4), formula_map(12, 16, 4)};
@@ -52,11 +66,9 @@ TEST(SegmentationSteps, RoiAlignGivesTheReferencesNumbers) {
 
 TEST(SegmentationSteps, PastingGivesTheReferencesPixels) {
   const nlohmann::json wanted = formulas().at("paste");
-  std::vector<float> probabilities;
-  for (int y = 0; y < 28; ++y)
-    for (int x = 0; x < 28; ++x) probabilities.push_back(static_cast<float>((13 * y + 7 * x) % 29) / 28.f);
+  const std::vector<float> probabilities = formula_mask();
   const PastedMask pasted =
-      paste_mask(probabilities.data(), 28, box_of(wanted.at("box")), {wanted.at("width"), wanted.at("height")});
+      paste_mask({probabilities.data(), 28, box_of(wanted.at("box"))}, {wanted.at("width"), wanted.at("height")});
   EXPECT_EQ(pasted.window, cv::Rect(wanted.at("x0"), wanted.at("y0"), wanted.at("w"), wanted.at("h")));
   int differing = 0;
   for (int y = 0; y < pasted.mask.rows; ++y)
@@ -64,14 +76,30 @@ TEST(SegmentationSteps, PastingGivesTheReferencesPixels) {
   EXPECT_LE(differing, 3);  // a value of 0.5 sharp may fall to either side
 
   const nlohmann::json mixed = wanted.at("mixed");
-  std::vector<float> semantic;
-  for (int y = 0; y < 48; ++y)
-    for (int x = 0; x < 64; ++x) semantic.push_back(static_cast<float>((5 * y + 3 * x) % 17) / 16.f);
+  const std::vector<float> semantic = formula_hint();
   const SemanticHint hint{semantic.data(), 48, 64, 1, 2.f / 8, 2.5f / 8, 0.5f};
-  const PastedMask both = paste_mask(probabilities.data(), 28, box_of(wanted.at("box")),
+  const PastedMask both = paste_mask({probabilities.data(), 28, box_of(wanted.at("box"))},
                                      {wanted.at("width"), wanted.at("height")}, 0.48f, &hint);
   EXPECT_NEAR(cv::countNonZero(both.mask), mixed.at("pixels").get<int>(), 3);
   EXPECT_NEAR(both.certainty, mixed.at("certainty").get<float>(), 2e-3);
+}
+
+TEST(SegmentationSteps, ARefinementGetsTheReferencesLogits) {
+  const nlohmann::json wanted = formulas().at("refine");
+  const std::vector<float> probabilities = formula_mask(), semantic = formula_hint();
+  const SemanticHint hint{semantic.data(), 48, 64, 1, 1.f / 8, 1.f / 8, 0.35f};
+  const DetectionBox box = box_of(wanted.at("box")), region = box.grown(1.f / 14);
+  EXPECT_NEAR(region.x0, wanted.at("region")[0].get<float>(), 1e-3);
+  EXPECT_NEAR(region.y1, wanted.at("region")[3].get<float>(), 1e-3);
+  std::vector<float> sampled(56 * 56);
+  sample_mask({probabilities.data(), 28, box}, region, 56, &hint, sampled.data());
+  EXPECT_NEAR(mean_inside(sampled, 0.44f), wanted.at("certainty").get<float>(), 1e-3);
+  bend_logits(sampled, 0.44f);
+  const nlohmann::json& rows = wanted.at("logits_of_every_5th_row");
+  ASSERT_EQ(rows.size(), 12u);
+  for (std::size_t y = 0; y < rows.size(); ++y)
+    for (std::size_t x = 0; x < rows[y].size(); ++x)
+      EXPECT_NEAR(sampled[y * 5 * 56 + x * 5], rows[y][x].get<float>(), 2e-3) << y << " " << x;
 }
 
 TEST(SegmentationSteps, SuppressionAndDecodingAgreeWithTheReference) {
@@ -92,8 +120,8 @@ TEST(SegmentationSteps, SuppressionAndDecodingAgreeWithTheReference) {
 
 TEST(SegmentationSteps, AnEmptyBoxPastesNothing) {
   const std::vector<float> ones(28 * 28, 1.f);
-  EXPECT_TRUE(paste_mask(ones.data(), 28, {10, 10, 10, 10}, {100, 100}).window.empty());
-  EXPECT_TRUE(paste_mask(ones.data(), 28, {100, 5, 100, 50}, {100, 100}).window.empty());
+  EXPECT_TRUE(paste_mask({ones.data(), 28, {10, 10, 10, 10}}, {100, 100}).window.empty());
+  EXPECT_TRUE(paste_mask({ones.data(), 28, {100, 5, 100, 50}}, {100, 100}).window.empty());
 }
 
 TEST(SegmentationSteps, ImagesOfEveryUsualTypeAreAccepted) {
