@@ -138,12 +138,13 @@ SemanticHint NetworkSegmenter::semantic_hint(const TrunkOutput& trunk, float sca
 }
 
 Result<NetworkSegmenter::RefinedMask> NetworkSegmenter::refine(const TrunkOutput& trunk, const MaskGrid& mask,
-                                                               float threshold, const SemanticHint* hint) {
+                                                               float score, float threshold, const SemanticHint* hint) {
   const DetectionBox region = mask.box.grown(model_.refine_margin);
   const RefineInput input = graphs_->refine_input();
   sample_mask(mask, region, NetworkGraphs::kRefineSide, hint, input.logits.data());
   // Of the mask before: a refined one is surer of itself, but ranks objects no better.
   const float certainty = mean_inside(input.logits, threshold);
+  if (!(score * certainty >= limits_.score)) return RefinedMask{};
   bend_logits(input.logits, threshold);
   roi_align(trunk.fine, model_.fine_channels, region, NetworkGraphs::kRefineSide, input.features.data());
   const Result<std::span<const float>> refined = graphs_->refine_head();
@@ -168,9 +169,10 @@ Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Objec
                       threshold, person ? &hint : nullptr);
   }
   const SemanticHint hint = semantic_hint(trunk, 1, 1);
-  Result<RefinedMask> refined =
-      refine(trunk, {mask.data(), NetworkGraphs::kMaskSide, object.box}, threshold, person ? &hint : nullptr);
+  Result<RefinedMask> refined = refine(trunk, {mask.data(), NetworkGraphs::kMaskSide, object.box}, object.score,
+                                       threshold, person ? &hint : nullptr);
   if (!refined) return refined.error();
+  if (refined->certainty == 0) return PastedMask{};
   const DetectionBox& b = refined->grid.box;
   refined->grid.box = {b.x0 / scale_x, b.y0 / scale_y, b.x1 / scale_x, b.y1 / scale_y};
   PastedMask pasted = paste_mask(refined->grid, image);

@@ -45,7 +45,9 @@ class NetworkSegmenter final : public Segmenter {
   Result<PastedMask> paste(const TrunkOutput& trunk, const Object& object, float scale_x, float scale_y,
                            cv::Size image);
   /// Sharpens a mask of the network's input with the trunk's fine features; what is returned is inside where >= 0.5.
-  Result<RefinedMask> refine(const TrunkOutput& trunk, const MaskGrid& mask, float threshold, const SemanticHint* hint);
+  /// @param score the box head's; certainty is 0 and nothing is refined where the two would fall short of the least.
+  Result<RefinedMask> refine(const TrunkOutput& trunk, const MaskGrid& mask, float score, float threshold,
+                             const SemanticHint* hint);
   Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y,
               Segmentation& out);
   void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,

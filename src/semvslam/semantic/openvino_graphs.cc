@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <bit>
 #include <map>
 #include <openvino/openvino.hpp>
 
@@ -69,6 +70,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
                       "f32, or export it with --int8",
                       folder.string()));
     trunk_name_ = precision == "int8" ? model.trunk_int8 : model.trunk;
+    const bool floats = options.count(ov::hint::inference_precision.name()) > 0 || precision == "int8";
+    short_features_ = !floats && core().get_property("CPU", ov::hint::inference_precision) == ov::element::bf16;
     load_trunk(folder / trunk_name_, options);
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
@@ -99,6 +102,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
         });
         !s)
       return s.error();
+    for (ShortOutput& o : short_outputs_) o.widen();
     return trunk_out_;
   }
 
@@ -180,6 +184,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
           .mean(127.5f)
           .scale(127.5f);
       p.input().model().set_layout("NCHW");
+      if (short_features_)
+        for (const ov::Output<ov::Node>& o : m->outputs())
+          if (is_feature(o.get_any_name())) p.output(o.get_any_name()).tensor().set_element_type(ov::element::bf16);
       trunk_ = compile(p.build(), options).create_infer_request();
     } catch (const std::exception& e) {
       throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
@@ -191,8 +198,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
       const auto part = [&](const char* name, std::size_t channels) {
         return output(trunk_, trunk_name_, fmt::format("{}{}", name, l + 3), {1, r, c, channels});
       };
-      trunk_out_.levels[l].features = {part("p", static_cast<std::size_t>(model_.channels)).data(), rows, columns,
-                                       stride};
+      trunk_out_.levels[l].features =
+          features(fmt::format("p{}", l + 3), rows, columns, stride, static_cast<std::size_t>(model_.channels));
       trunk_out_.levels[l].objectness = part("objectness", a);
       trunk_out_.levels[l].deltas = part("deltas", a * 4);
     }
@@ -200,10 +207,31 @@ class OpenVinoGraphs final : public NetworkGraphs {
                c = static_cast<std::size_t>(model_.input.width / model_.strides[0]);
     trunk_out_.semantic = output(trunk_, trunk_name_, "semantic", {1, r, c, TrunkOutput::kSemanticChannels});
     if (model_.refine.empty()) return;
-    const int rows = model_.input.height / model_.fine_stride, columns = model_.input.width / model_.fine_stride;
-    const Shape fine{1, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns),
-                     static_cast<std::size_t>(model_.fine_channels)};
-    trunk_out_.fine = {output(trunk_, trunk_name_, "fine", fine).data(), rows, columns, model_.fine_stride};
+    trunk_out_.fine =
+        features("fine", model_.input.height / model_.fine_stride, model_.input.width / model_.fine_stride,
+                 model_.fine_stride, static_cast<std::size_t>(model_.fine_channels));
+  }
+
+  static bool is_feature(const std::string& output) { return output.starts_with('p') || output == "fine"; }
+
+  /// Features that the trunk computed in bfloat16, handed over as they are: widening them takes OpenVINO ten times as
+  /// long as it takes here.
+  struct ShortOutput {
+    ov::Tensor shorts;
+    std::vector<float> floats;
+    void widen() {
+      const auto* from = static_cast<const std::uint16_t*>(shorts.data());
+      for (std::size_t k = 0; k < floats.size(); ++k)
+        floats[k] = std::bit_cast<float>(static_cast<std::uint32_t>(from[k]) << 16U);
+    }
+  };
+
+  FeatureMap features(const std::string& name, int rows, int columns, int stride, std::size_t channels) {
+    const Shape shape{1, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns), channels};
+    if (!short_features_) return {output(trunk_, trunk_name_, name, shape).data(), rows, columns, stride};
+    ov::Tensor t = checked(trunk_, trunk_name_, name, ov::element::bf16, shape);
+    short_outputs_.push_back({t, std::vector<float>(count(shape))});
+    return {short_outputs_.back().floats.data(), rows, columns, stride};
   }
 
   static ov::InferRequest load_graph(const std::filesystem::path& file, const Inputs& inputs,
@@ -226,22 +254,29 @@ class OpenVinoGraphs final : public NetworkGraphs {
   /// Output memory does not move between calls: shapes are fixed.
   static std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name,
                                        const Shape& wanted) {
+    return {checked(request, file, name, ov::element::f32, wanted).data<float>(), count(wanted)};
+  }
+
+  static ov::Tensor checked(ov::InferRequest& request, const std::string& file, const std::string& name,
+                            const ov::element::Type& type, const Shape& wanted) {
     ov::Tensor t;
     try {
       t = request.get_tensor(name);
     } catch (const std::exception&) {
       throw WrongTensor(fmt::format("{}: there is no output '{}'", file, name));
     }
-    if (t.get_element_type() != ov::element::f32 || t.get_shape() != ov::Shape(wanted))
-      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected f32 [{}]", file, name,
-                                    t.get_element_type().to_string(), t.get_shape().to_string(),
+    if (t.get_element_type() != type || t.get_shape() != ov::Shape(wanted))
+      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected {} [{}]", file, name,
+                                    t.get_element_type().to_string(), t.get_shape().to_string(), type.to_string(),
                                     fmt::join(wanted, ",")));
-    return {t.data<float>(), count(wanted)};
+    return t;
   }
 
   ModelDescription model_;
   std::string trunk_name_;
   ov::InferRequest trunk_, box_, mask_, refine_;
+  bool short_features_ = false;
+  std::vector<ShortOutput> short_outputs_;  // a moved one keeps its memory
   TrunkOutput trunk_out_;
   std::span<const float> probabilities_, box_deltas_, masks_, refined_;
   RefineInput refine_in_;
