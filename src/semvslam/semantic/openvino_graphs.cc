@@ -214,8 +214,8 @@ class OpenVinoGraphs final : public NetworkGraphs {
 
   static bool is_feature(const std::string& output) { return output.starts_with('p') || output == "fine"; }
 
-  /// Features that the trunk computed in bfloat16, handed over as they are: widening them takes OpenVINO ten times as
-  /// long as it takes here.
+  /// Features that the trunk computed in bfloat16, handed over as they are: widening them takes OpenVINO several times
+  /// as long as it takes here.
   struct ShortOutput {
     ov::Tensor shorts;
     std::vector<float> floats;
