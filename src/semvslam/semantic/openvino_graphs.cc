@@ -150,19 +150,22 @@ class OpenVinoGraphs final : public NetworkGraphs {
   using Inputs = std::map<std::string, ov::PartialShape>;
 
   static void check_inputs(const std::shared_ptr<ov::Model>& m, const Inputs& wanted) {
+    std::map<std::string, ov::PartialShape> own;
+    for (const auto& i : m->inputs())
+      for (const std::string& name : i.get_names()) own.emplace(name, i.get_partial_shape());
     std::vector<std::string> names;
-    for (const auto& [name, shape] : wanted) names.push_back(fmt::format("'{}'", name));
+    bool complete = m->inputs().size() == wanted.size();
     for (const auto& [name, shape] : wanted) {
-      const auto& inputs = m->inputs();
-      const auto found =
-          std::find_if(inputs.begin(), inputs.end(), [&](const auto& i) { return i.get_names().contains(name); });
-      if (inputs.size() != wanted.size() || found == inputs.end())
-        throw WrongTensor(fmt::format("expected {} input{}, named {}", wanted.size(), wanted.size() == 1 ? "" : "s",
-                                      fmt::join(names, ", ")));
-      if (const ov::PartialShape own = found->get_partial_shape(); !own.compatible(shape))
-        throw WrongTensor(
-            fmt::format("input '{}' has the shape {}, expected {}", name, own.to_string(), shape.to_string()));
+      names.push_back(fmt::format("'{}'", name));
+      complete &= own.contains(name);
     }
+    if (!complete)
+      throw WrongTensor(fmt::format("expected {} input{}, named {}", wanted.size(), wanted.size() == 1 ? "" : "s",
+                                    fmt::join(names, ", ")));
+    for (const auto& [name, shape] : wanted)
+      if (!own.at(name).compatible(shape))
+        throw WrongTensor(
+            fmt::format("input '{}' has the shape {}, expected {}", name, own.at(name).to_string(), shape.to_string()));
   }
 
   void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
