@@ -17,7 +17,7 @@ class NetworkSegmenter final : public Segmenter {
     float proposal_overlap = 0.7f;  // IoU above which the weaker of two proposals goes
     float object_overlap = 0.5f;    // the same of objects of one class
     int objects = 50;
-    float score = 0.45f;  // least score of an object
+    float score = static_cast<float>(kLeastScore);
   };
 
   /// @param timers may be null; gets segment.prepare, .trunk, .proposals, .boxes, .masks. Must outlive this object.

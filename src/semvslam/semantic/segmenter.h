@@ -37,6 +37,8 @@ class Segmenter {
   /// 10^9 operations (two to a multiply-add) of an image with so many proposals and masks; 0 = none or not known.
   static constexpr int kCostProposals = 100, kCostMasks = 5;
   virtual double gflops() const { return 0; }
+  /// Least score of an instance beside a camera: even odds, and a mask as sure as good ones are (0.9).
+  static constexpr double kLeastScore = 0.45;
   /// One line for logs.
   virtual std::string description() const = 0;
 };
@@ -51,8 +53,8 @@ struct SegmenterOptions {
   // and more than that width.
   bool keep_up = true;
   std::string mask_folder;  // of source `folder`
-  double score = 0.45;      // least score of an instance: even odds, and a mask as sure as good ones are (0.9)
-  int threads = 2;          // of the network; 0 = what suits the machine beside tracking
+  double score = Segmenter::kLeastScore;
+  int threads = 2;  // of the network; 0 = what suits the machine beside tracking
 
   void add_to(ConfigSchema& schema);
 };
