@@ -46,11 +46,13 @@ def formulas():
     levels = [value(48, 64, 4), value(24, 32, 4), value(12, 16, 4)]
     boxes = np.array([[10, 12, 60, 100], [-20, -10, 40, 50], [100, 50, 380, 330], [0, 0, 512, 384], [300.5, 200.25, 511.9, 383.9], [5, 5, 5.5, 9]], np.float32)
     prob = ((np.add.outer(np.arange(28) * 13, np.arange(28) * 7) % 29) / 28).astype(np.float32)
-    (x0, y0, window), _ = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120))
+    corners = [-7.3, 20.6, 50.2, 99.5]
+    box = np.array(corners, np.float32)
+    (x0, y0, window), _ = infer.paste(prob, box, (90, 120))
     hint = (((np.arange(48)[:, None] * 5 + np.arange(64)[None] * 3) % 17) / 16).astype(np.float32)
-    (_, _, mixed), certainty = infer.paste(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), (90, 120), 0.48, hint, (2.0, 2.5), 0.5)
-    region = infer.grown(np.array([[-7.3, 20.6, 50.2, 99.5]], np.float32), infer.REFINE_MARGIN)[0]
-    coarse = infer.on_region(prob, np.array([-7.3, 20.6, 50.2, 99.5], np.float32), region, hint, 0.35)
+    (_, _, mixed), certainty = infer.paste(prob, box, (90, 120), 0.48, hint, (2.0, 2.5), 0.5)
+    region = infer.grown(box[None], infer.REFINE_MARGIN)[0]
+    coarse = infer.on_region(prob, box, region, hint, 0.35)
     nb = np.array([[i * 7 % 50, i * 13 % 40, i * 7 % 50 + 30 + i % 5, i * 13 % 40 + 25 + i % 7] for i in range(40)], np.float32)
     ns = np.array([(i * 29 % 41) / 41 for i in range(40)], np.float32)
     ref = np.array([[10, 20, 60, 90], [0, 0, 500, 380]], np.float32)
@@ -59,11 +61,11 @@ def formulas():
                      "mask probabilities: ((13 y + 7 x) mod 29) / 28",
             "roi_align": {"boxes": listed(boxes), "cells7": listed(infer.roi_align(levels, boxes, 7, infer.BOX_LEVELS).reshape(len(boxes), -1)),
                           "cells14_sum": listed(infer.roi_align(levels, boxes, 14, infer.MASK_LEVELS).sum((1, 2)), 3)},
-            "paste": {"box": [-7.3, 20.6, 50.2, 99.5], "height": 90, "width": 120, "x0": x0, "y0": y0, "w": window.shape[1], "h": window.shape[0],
+            "paste": {"box": corners, "height": 90, "width": 120, "x0": x0, "y0": y0, "w": window.shape[1], "h": window.shape[0],
                       "row_counts": window.sum(1).tolist(),
                       "mixed": {"about": "semantic: ((5 y + 3 x) mod 17) / 16, 48x64 cells of 8 px, scale 2 and 2.5, share 0.5, threshold 0.48",
                                 "pixels": int(mixed.sum()), "certainty": certainty}},
-            "refine": {"about": "the same mask and semantic map, both in pixels of the input; share 0.35, threshold 0.44", "box": [-7.3, 20.6, 50.2, 99.5],
+            "refine": {"about": "the same mask and semantic map, both in pixels of the input; share 0.35, threshold 0.44", "box": corners,
                        "region": listed(region), "certainty": infer.mean_inside(coarse, 0.44),
                        "logits_of_every_5th_row": listed(infer.bent(coarse, 0.44)[::5, ::5], 4)},
             "nms": {"boxes": listed(nb), "scores": listed(ns, 7), "threshold": 0.5, "keep": infer.nms(nb, ns, 0.5, 50).tolist()},

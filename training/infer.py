@@ -173,9 +173,9 @@ def mean_inside(p, threshold):
 
 
 class OpenVino:
-    """The exported graphs. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
+    """The exported graphs. refine may be None. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
 
-    def __init__(self, folder, threads=2, precision=None, trunk="trunk.onnx", box="box.onnx", mask="mask.onnx", refine=None, size=None):
+    def __init__(self, folder, threads, precision, trunk, box, mask, refine, size=None):
         import openvino as ov
         core = ov.Core()
         options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1}

@@ -72,39 +72,18 @@ def loss_of(head, features, semantic, masks, labels, worth):
     return tuning.mask_loss(torch.logit(p) - torch.logit(even), masks.float().flatten(1) / 255, worth)
 
 
-def seen_iou(head, held):
-    """Mean IoU of persons' masks as they will be seen."""
-    features, semantic, masks, labels, _ = held
-    total, count = 0.0, 0
-    with torch.no_grad():
-        for i in torch.arange(len(labels)).split(256):
-            i = i[labels[i] == PERSON]
-            m = head(features[i].float().permute(0, 3, 1, 2)).sigmoid()[:, 0]
-            p = (mixed(m, semantic[i]) >= infer.MASK_THRESHOLD).flatten(1)
-            y = (masks[i] >= 128).flatten(1)
-            total += ((p & y).sum(1) / (p | y).sum(1).clamp(min=1)).sum().item()
-            count += len(i)
-    return total / max(1, count)
-
-
 def main():
-    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    tuning.add_arguments(a, pictures=6000, epochs=12, batch=64, lr=5e-4, bits=7)
-    o = a.parse_args()
-    os.makedirs(o.out, exist_ok=True)
-    torch.manual_seed(o.seed)
-    torch.set_num_threads(o.threads)
-    objects, held = tuning.parted(tuning.gathered(o.keep, lambda: Gatherer(o.model, o.threads), o))
+    o = tuning.begin(argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter),
+                     pictures=6000, epochs=12, batch=64, lr=5e-4, bits=7)
+    objects, held = tuning.parted(tuning.gathered(lambda: Gatherer(o.model, o.threads), o))
     head = plain_mask_head(o.model).requires_grad_(True).to(memory_format=torch.channels_last)
+    features, semantic = held[:2]
 
-    def loss(i, mirrored):
-        batch = [s[i] for s in objects]
-        if mirrored:
-            batch[:3] = batch[0].flip(2), batch[1].flip(2), batch[2].flip(2)
-        return loss_of(head, *batch)
+    def seen(i):
+        m = head(features[i].float().permute(0, 3, 1, 2)).sigmoid()[:, 0]
+        return mixed(m, semantic[i]) >= infer.MASK_THRESHOLD
 
-    with open(os.path.join(o.out, "log.jsonl"), "a", buffering=1) as log:
-        steps, before, after = tuning.train(head, len(objects[3]), loss, lambda: seen_iou(head, held), o, log)
+    trained = tuning.train(head, objects, lambda *batch: loss_of(head, *batch), lambda: tuning.held_iou(held, seen), o)
     export.write_mask(types.SimpleNamespace(mask=head), o.out)
     path = os.path.join(o.out, "mask.onnx")
     print(f"{export.coarse_weights(path, o.bits)} bytes packed")
@@ -112,9 +91,8 @@ def main():
         about = json.load(f)
     about["gflops"]["mask"] = cost.gflops(model.MaskRcnn(about["backbone"], len(about["classes"])).eval(), CANVAS)["mask"]
     about["mask_threshold"], about["sha256"]["mask.onnx"] = infer.MASK_THRESHOLD, export.sha(path)
-    about["training"]["mask_head"] = {"objects": len(objects[3]), "steps": steps, "held_out_iou": [round(before, 4), round(after, 4)]}
-    with open(os.path.join(o.out, "model.json"), "w") as f:
-        json.dump(about, f, indent=1)
+    about["training"]["mask_head"] = trained
+    tuning.write_about(about, o)
 
 
 if __name__ == "__main__":

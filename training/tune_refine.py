@@ -16,6 +16,7 @@ import torch
 from torchvision.ops import roi_align
 
 import export
+import fine_output
 import infer
 import tuning
 from segnet.refine import Refine
@@ -48,61 +49,32 @@ class Gatherer:
         return (torch.from_numpy(logits).half(), torch.from_numpy(features).half(), (true * 255).round().byte(), labels, target["worth"][which])
 
 
-def held_iou(head, held):
-    """Mean IoU of persons' masks within their regions."""
-    logits, features, masks, labels, _ = held
-    total, persons = 0.0, (labels == PERSON).nonzero()[:, 0]
-    with torch.no_grad():
-        for i in persons.split(128):
-            p = (head(logits[i].float(), features[i].float()) >= 0.5).flatten(1)
-            y = (masks[i] >= 128).flatten(1)
-            total += ((p & y).sum(1) / (p | y).sum(1).clamp(min=1)).sum().item()
-    return total / max(1, len(persons))
-
-
-def write(head, o, channels):
-    """The whole model into the folder o.out; returns what model.json becomes."""
-    x = torch.zeros(4, SIDE, SIDE), torch.zeros(4, SIDE, SIDE, channels)
-    export.write_graph(o.out, "refine", head.requires_grad_(False), x, ["logits", "features"], ["masks"], free=True)
-    print(f"{export.coarse_weights(os.path.join(o.out, 'refine.onnx'), o.bits)} bytes packed")
-    with open(os.path.join(o.out, "model.json")) as f:
-        about = json.load(f)
-    about.update(refine="refine.onnx", fine_stride=STRIDE, fine_channels=channels, refine_margin=infer.REFINE_MARGIN)
-    multiply_adds = SIDE * SIDE * sum(c.weight.numel() for c in (*head.convs, head.last))
-    about["gflops"]["refine"] = round(2e-9 * multiply_adds, 6)
-    about["sha256"] = {f: export.sha(os.path.join(o.out, f)) for f in sorted({*about["sha256"], "refine.onnx"})}
-    return about
-
-
 def main():
-    a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    tuning.add_arguments(a, pictures=9000, epochs=10, batch=32, lr=2e-3, bits=6)
-    o = a.parse_args()
-    os.makedirs(o.out, exist_ok=True)
-    torch.manual_seed(o.seed)
-    torch.set_num_threads(o.threads)
+    o = tuning.begin(argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter),
+                     pictures=9000, epochs=10, batch=32, lr=2e-3, bits=6)
     with open(os.path.join(o.model, "model.json")) as f:
         about = json.load(f)
     for name in ("model.json", *about["sha256"]):
         shutil.copyfile(os.path.join(o.model, name), os.path.join(o.out, name))
-    channels = export.add_fine(o.out, about.get("trunk_int8"), STRIDE)
-    objects, held = tuning.parted(tuning.gathered(o.keep, lambda: Gatherer(o.out, o.threads), o))
+    channels = fine_output.add(o.out, about.get("trunk_int8"), STRIDE)
+    objects, held = tuning.parted(tuning.gathered(lambda: Gatherer(o.out, o.threads), o))
     head = Refine(channels).to(memory_format=torch.channels_last)
     head.normalise(objects[1][:500])
 
-    def loss(i, mirrored):
-        logits, features, masks, _, worth = (s[i] for s in objects)
-        logits, features, masks = logits.float(), features.float(), masks.float() / 255
-        if mirrored:
-            logits, features, masks = logits.flip(2), features.flip(2), masks.flip(2)
-        return tuning.mask_loss(head.logits(logits, features).float().flatten(1), masks.flatten(1), worth)
+    def loss(logits, features, masks, _, worth):
+        out = head.logits(logits.float(), features.float()).float()
+        return tuning.mask_loss(out.flatten(1), masks.float().flatten(1) / 255, worth)
 
-    with open(os.path.join(o.out, "log.jsonl"), "a", buffering=1) as log:
-        steps, before, after = tuning.train(head, len(objects[3]), loss, lambda: held_iou(head, held), o, log)
-    about = write(head, o, channels)
-    about["training"]["refine"] = {"objects": len(objects[3]), "steps": steps, "held_out_iou": [round(before, 4), round(after, 4)]}
-    with open(os.path.join(o.out, "model.json"), "w") as f:
-        json.dump(about, f, indent=1)
+    seen = lambda i: head(held[0][i].float(), held[1][i].float()) >= 0.5
+    trained = tuning.train(head, objects, loss, lambda: tuning.held_iou(held, seen), o)
+    x = torch.zeros(4, SIDE, SIDE), torch.zeros(4, SIDE, SIDE, channels)
+    export.write_graph(o.out, "refine", head.requires_grad_(False), x, ["logits", "features"], ["masks"], free=True)
+    print(f"{export.coarse_weights(os.path.join(o.out, 'refine.onnx'), o.bits)} bytes packed")
+    about.update(refine="refine.onnx", fine_stride=STRIDE, fine_channels=channels, refine_margin=infer.REFINE_MARGIN)
+    about["gflops"]["refine"] = round(2e-9 * SIDE * SIDE * sum(c.weight.numel() for c in (*head.convs, head.last)), 6)
+    about["sha256"] = {f: export.sha(os.path.join(o.out, f)) for f in sorted({*about["sha256"], "refine.onnx"})}
+    about["training"]["refine"] = trained
+    tuning.write_about(about, o)
 
 
 if __name__ == "__main__":

@@ -40,9 +40,8 @@ class Regions:
         """Found boxes on objects whose mask is known, and their true boxes moved a little: [n, 4], and which object each is on."""
         true = target["boxes"].numpy()
         drawn = np.nonzero(target["drawn"].numpy())[0]
-        none = np.zeros((0, 4), np.float32), np.zeros(0, int)
         if not len(drawn):
-            return none
+            return np.zeros((0, 4), np.float32), np.zeros(0, int)
         size = np.concatenate((true[:, 2:] - true[:, :2],) * 2, 1)
         rois, which = [], []
         found = self.found(t, levels)
@@ -65,13 +64,13 @@ def with_index(boxes_, same=False):
     return torch.cat((index * 0 if same else index, b), 1)
 
 
-def gathered(keep, gatherer, o):
-    """What a gatherer sees in augmented pictures, half of them nearly plain, boxes as in use; from the file `keep` if that is there.
+def gathered(gatherer, o):
+    """What a gatherer sees in augmented pictures, half of them nearly plain, boxes as in use; from the file o.keep if that is there.
 
     gatherer() gives the function (picture, target, rng) -> tensors with a row per object, or None. o: of the command line.
     """
-    if keep and os.path.exists(keep):
-        return torch.load(keep)
+    if o.keep and os.path.exists(o.keep):
+        return torch.load(o.keep)
     see, now = gatherer(), time.time()
     data = dataset.Batches([(*o.train, None)] + o.also, [o.seed], now - 0.6 * 1e6, now + 0.4 * 1e6, canvases=((*CANVAS, 2), (*CANVAS, 2)))
     rng, parts, seen = np.random.default_rng(o.seed), [], 0
@@ -86,8 +85,8 @@ def gathered(keep, gatherer, o):
         if seen >= o.pictures:
             break
     stored = [torch.cat(p) for p in zip(*parts)]
-    if keep:
-        torch.save(stored, keep)
+    if o.keep:
+        torch.save(stored, o.keep)
     return stored
 
 
@@ -103,23 +102,50 @@ def mask_loss(logits, masks, worth):
     return (loss * worth).sum() / worth.sum()
 
 
-def train(head, objects, loss_of, held_iou, o, log):
-    """AdamW with a rate that falls as a cosine; head gets the running mean of its weights. Returns held_iou() before and after.
+def held_iou(held, seen):
+    """Mean IoU of persons' masks. held: masks, u8, third, classes fourth. seen(indices) -> bool, of the masks' shape."""
+    masks, labels = held[2:4]
+    total, persons = 0.0, (labels == PERSON).nonzero()[:, 0]
+    with torch.no_grad():
+        for i in persons.split(128):
+            p, y = seen(i).flatten(1), (masks[i] >= 128).flatten(1)
+            total += ((p & y).sum(1) / (p | y).sum(1).clamp(min=1)).sum().item()
+    return total / max(1, len(persons))
 
-    loss_of(indices [o.batch], mirrored or not) -> loss. o: epochs, batch, lr, of the command line. log: a file of JSON lines.
+
+def begin(a, **defaults):
+    """Parses the command line; a: its parser. The folder that is written to is there afterwards."""
+    add_arguments(a, **defaults)
+    o = a.parse_args()
+    os.makedirs(o.out, exist_ok=True)
+    torch.manual_seed(o.seed)
+    torch.set_num_threads(o.threads)
+    return o
+
+
+def train(head, objects, loss_of, iou, o):
+    """AdamW with a rate that falls as a cosine; head gets the running mean of its weights. Returns what model.json says of it.
+
+    objects: tensors with a row per object; the first three are pictures, their width the third dimension. loss_of(*rows of them) -> loss.
+    iou() -> of the held-out. o: of the command line; its folder gets log.jsonl.
     """
-    steps = int(o.epochs * objects / o.batch)
-    before = held_iou()
+    n = len(objects[0])
+    steps, before = int(o.epochs * n / o.batch), iou()
+    log = open(os.path.join(o.out, "log.jsonl"), "a", buffering=1)
     write = lambda **row: log.write(json.dumps({k: round(v, 4) if isinstance(v, float) else v for k, v in row.items()}) + "\n")
-    write(objects=objects, steps=steps, held_iou=before)
+    write(objects=n, steps=steps, held_iou=before)
     opt = torch.optim.AdamW(head.parameters(), lr=o.lr, betas=(0.9, 0.99), weight_decay=0.01)
     average = {k: v.clone() for k, v in head.state_dict().items()}
     mean, short = None, torch.ops.mkldnn._is_mkldnn_bf16_supported()
     for step in range(steps):
+        i = torch.randint(n, (o.batch,))
+        batch = [s[i] for s in objects]
+        if torch.rand(()) < 0.5:
+            batch[:3] = (s.flip(2) for s in batch[:3])
         for g in opt.param_groups:
             g["lr"] = o.lr * min(1, (step + 1) / 100) * 0.5 * (1 + np.cos(np.pi * step / steps))
         with torch.autocast("cpu", torch.bfloat16, enabled=short):
-            loss = loss_of(torch.randint(objects, (o.batch,)), bool(torch.rand(()) < 0.5))
+            loss = loss_of(*batch)
         opt.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(head.parameters(), 5.0)
@@ -129,11 +155,17 @@ def train(head, objects, loss_of, held_iou, o, log):
         mean = loss.item() if mean is None else 0.99 * mean + 0.01 * loss.item()
         if (step + 1) % 500 == 0 or step + 1 == steps:
             shown = (step + 1) % 2000 == 0 or step + 1 == steps
-            write(step=step + 1, loss=mean, **({"held_iou": held_iou()} if shown else {}))
+            write(step=step + 1, loss=mean, **({"held_iou": iou()} if shown else {}))
     head.load_state_dict(average)
-    after = held_iou()
+    after = iou()
     write(averaged=True, held_iou=after)
-    return steps, before, after
+    log.close()
+    return {"objects": n, "steps": steps, "held_out_iou": [round(before, 4), round(after, 4)]}
+
+
+def write_about(about, o):
+    with open(os.path.join(o.out, "model.json"), "w") as f:
+        json.dump(about, f, indent=1)
 
 
 def add_arguments(a, pictures, epochs, batch, lr, bits):

@@ -11,6 +11,8 @@ struct DetectionBox {
   float x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   float width() const { return x1 - x0; }
   float height() const { return y1 - y0; }
+  /// Where it lies in an image that was scaled by x and y to become the one it is in.
+  DetectionBox unscaled(float x, float y) const { return {x0 / x, y0 / y, x1 / x, y1 / y}; }
   /// @param share of the width and of the height that is added on each side.
   DetectionBox grown(float share) const {
     return {x0 - share * width(), y0 - share * height(), x1 + share * width(), y1 + share * height()};

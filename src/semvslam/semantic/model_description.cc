@@ -36,14 +36,6 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.mask = j.at("mask").get<std::string>();
   m.trunk_int8 = j.value("trunk_int8", "");
   m.refine = j.value("refine", "");
-  if (!m.refine.empty()) {
-    m.fine_stride = integer_at<int>(j, "fine_stride");
-    m.fine_channels = integer_at<int>(j, "fine_channels");
-    m.refine_margin = j.at("refine_margin").get<float>();
-    check(m.fine_stride > 0 && m.fine_stride <= 32, "'fine_stride' is not within 1 .. 32");
-    check(m.fine_channels > 0 && m.fine_channels <= 4096, "'fine_channels' is out of range");
-    check(m.refine_margin >= 0 && m.refine_margin <= 1, "'refine_margin' is not within 0 .. 1");
-  }
   m.input = {integer_at<int>(j.at("input"), "width"), integer_at<int>(j.at("input"), "height")};
   m.pad = integer_at<int>(j.at("input"), "pad");
   m.classes = j.at("classes").get<std::vector<std::string>>();
@@ -76,8 +68,15 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   for (const float w : m.box_weights) check(w >= .01f && w <= 1e4f, "'box_weights' must be within 0.01 .. 10000");
   for (const int s : m.strides)
     check(s > 0 && m.input.width % s == 0 && m.input.height % s == 0, "'input' is no multiple of 'strides'");
-  if (!m.refine.empty())
+  if (!m.refine.empty()) {
+    m.fine_stride = integer_at<int>(j, "fine_stride");
+    m.fine_channels = integer_at<int>(j, "fine_channels");
+    m.refine_margin = j.at("refine_margin").get<float>();
+    check(m.fine_stride > 0 && m.fine_stride <= 32, "'fine_stride' is not within 1 .. 32");
+    check(m.fine_channels > 0 && m.fine_channels <= 4096, "'fine_channels' is out of range");
+    check(m.refine_margin >= 0 && m.refine_margin <= 1, "'refine_margin' is not within 0 .. 1");
     check(m.strides.back() % m.fine_stride == 0, "the last of 'strides' is no multiple of 'fine_stride'");
+  }
   check(m.box_levels.size() < ModelDescription::kLevels && m.mask_levels.size() < ModelDescription::kLevels,
         "too many level thresholds");
 }

@@ -15,10 +15,10 @@ bool finite(std::span<const float> values) {
 }
 
 /// A box of the network's input in the image that was fitted into it; the part on the filling is cut off.
-DetectionBox in_image(const DetectionBox& b, float scale_x, float scale_y, cv::Size image) {
+DetectionBox in_image(const DetectionBox& box, float scale_x, float scale_y, cv::Size image) {
   const auto width = static_cast<float>(image.width), height = static_cast<float>(image.height);
-  return {std::min(b.x0 / scale_x, width), std::min(b.y0 / scale_y, height), std::min(b.x1 / scale_x, width),
-          std::min(b.y1 / scale_y, height)};
+  const DetectionBox b = box.unscaled(scale_x, scale_y);
+  return {std::min(b.x0, width), std::min(b.y0, height), std::min(b.x1, width), std::min(b.y1, height)};
 }
 
 Error not_finite(const char* what) {
@@ -173,8 +173,7 @@ Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Objec
                                        threshold, person ? &hint : nullptr);
   if (!refined) return refined.error();
   if (refined->certainty == 0) return PastedMask{};
-  const DetectionBox& b = refined->grid.box;
-  refined->grid.box = {b.x0 / scale_x, b.y0 / scale_y, b.x1 / scale_x, b.y1 / scale_y};
+  refined->grid.box = refined->grid.box.unscaled(scale_x, scale_y);
   PastedMask pasted = paste_mask(refined->grid, image);
   if (pasted.certainty > 0) pasted.certainty = refined->certainty;
   return pasted;

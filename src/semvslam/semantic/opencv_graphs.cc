@@ -40,6 +40,7 @@ class OpenCvGraphs final : public NetworkGraphs {
       std::vector<cv::String> names;
       for (const char* kind : {"p", "objectness", "deltas"})
         for (int l = 3; l < 3 + ModelDescription::kLevels; ++l) names.push_back(fmt::format("{}{}", kind, l));
+      const std::size_t semantic = names.size();
       names.emplace_back("semantic");
       if (!model_.refine.empty()) names.emplace_back("fine");
       outputs_.clear();
@@ -56,11 +57,11 @@ class OpenCvGraphs final : public NetworkGraphs {
       }
       const std::size_t finest =
           static_cast<std::size_t>(model_.input.height / model_.strides[0]) * (model_.input.width / model_.strides[0]);
-      out.semantic = numbers(outputs_[9], finest * TrunkOutput::kSemanticChannels, names[9]);
+      out.semantic = numbers(outputs_[semantic], finest * TrunkOutput::kSemanticChannels, names[semantic]);
       if (!model_.refine.empty()) {
         const int rows = model_.input.height / model_.fine_stride, columns = model_.input.width / model_.fine_stride;
         const std::size_t count = static_cast<std::size_t>(rows) * columns * model_.fine_channels;
-        out.fine = {numbers(outputs_[10], count, names[10]).data(), rows, columns, model_.fine_stride};
+        out.fine = {numbers(outputs_.back(), count, names.back()).data(), rows, columns, model_.fine_stride};
       }
       return out;
     });

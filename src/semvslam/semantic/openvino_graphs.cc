@@ -75,7 +75,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
     load_trunk(folder / trunk_name_, options);
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
-    const auto c = static_cast<std::size_t>(model.channels);
+    const ov::Dimension c = model.channels;
     box_ = load_graph(folder / model.box, {{"rois", {kBoxBatch, kBoxCells, kBoxCells, c}}}, options);
     probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
     box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
@@ -83,10 +83,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
     masks_ = output(mask_, model.mask, "masks", {1, kMaskChannels, kMaskSide, kMaskSide});
     if (model.refine.empty()) return;
     constexpr std::size_t kSide = kRefineSide;
-    refine_ = load_graph(
-        folder / model.refine,
-        {{"logits", {1, kSide, kSide}}, {"features", {1, kSide, kSide, static_cast<std::size_t>(model.fine_channels)}}},
-        options);
+    refine_ =
+        load_graph(folder / model.refine,
+                   {{"logits", {1, kSide, kSide}}, {"features", {1, kSide, kSide, model.fine_channels}}}, options);
     refined_ = output(refine_, model.refine, "masks", {1, kSide, kSide});
     refine_in_ = {input(refine_, "logits"), input(refine_, "features")};
   }
