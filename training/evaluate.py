@@ -44,13 +44,13 @@ class Torch:
         return {"masks": self.call(2, x).numpy()}
 
 
-def open_model(path, size, int8=False, threads=2, refine=True):
+def open_model(path, size, int8=False, threads=2, refine=True, box_energy=1.0):
     size = infer.size_of(size)
     if path.endswith(".pt"):
         t = Torch(path, size or (480, 640))
         return infer.Segmenter(t), t.names
     # f32, for scores that do not depend on the processor: OpenVINO takes bfloat16 wherever it exists.
-    seg, m = infer.open_model(path, threads, "f32", int8, size, refine)
+    seg, m = infer.open_model(path, threads, "f32", int8, size, refine, box_energy)
     return seg, m["classes"]
 
 
@@ -168,9 +168,10 @@ def main():
     a.add_argument("--size", help="of the network's input, height x width; default: as exported, 480x640 for a check point")
     a.add_argument("--int8", action="store_true", help="the trunk in INT8")
     a.add_argument("--coarse", action="store_true", help="masks as the mask head gives them, not refined")
+    a.add_argument("--box-energy", type=float, default=1.0, metavar="E", help="the box head as beside a camera, where this is 0.88")
     a.add_argument("--json")
     o = a.parse_args()
-    seg, names = open_model(o.model, o.size, o.int8, refine=not o.coarse)
+    seg, names = open_model(o.model, o.size, o.int8, refine=not o.coarse, box_energy=o.box_energy)
     out = {"model": os.path.basename(os.path.normpath(o.model))}
     if o.coco:
         out["coco"] = score_coco(seg, names, *o.coco, o.score or infer.SURE_OF_STILLS, o.drawn)

@@ -172,10 +172,26 @@ def mean_inside(p, threshold):
     return float(p[inside].mean()) if inside.any() else 0.0
 
 
-class OpenVino:
-    """The exported graphs. refine may be None. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported."""
+def shorten_largest_product(model, energy):
+    """The largest product with a constant matrix as two that keep this share of its sum of squares (the program's low_rank.h)."""
+    from openvino import opset8
+    from openvino.utils import replace_node
+    products = [n for n in model.get_ordered_ops() if n.get_type_name() == "MatMul" and n.input_value(1).get_node().get_type_name() == "Constant"]
+    largest = max(products, key=lambda n: n.input_value(1).get_node().data.size)
+    weights = np.array(largest.input_value(1).get_node().data)
+    values, vectors = np.linalg.eigh((weights @ weights.T).astype(np.float64))
+    squares = np.maximum(values[::-1], 0)
+    rank = int(np.searchsorted(np.cumsum(squares), energy * squares.sum())) + 1
+    high = vectors[:, ::-1][:, :rank].astype(np.float32)
+    times = lambda left, right: opset8.matmul(left, opset8.constant(np.ascontiguousarray(right)), False, True)
+    replace_node(largest, times(times(largest.input_value(0), high.T @ weights), high))
 
-    def __init__(self, folder, threads, precision, trunk, box, mask, refine, size=None):
+
+class OpenVino:
+    """The exported graphs. refine may be None. size: (h, w) of the trunk's input, multiples of 32; None = as it was exported.
+    box_energy: see shorten_largest_product; 1 = the box head as it is."""
+
+    def __init__(self, folder, threads, precision, trunk, box, mask, refine, size=None, box_energy=1.0):
         import openvino as ov
         core = ov.Core()
         options = {"INFERENCE_NUM_THREADS": threads, "NUM_STREAMS": 1}
@@ -184,6 +200,8 @@ class OpenVino:
         models = [core.read_model(os.path.join(folder, f)) for f in (trunk, box, mask, refine) if f]
         if size:
             models[0].reshape([1, 3, *size])
+        if box_energy < 1:
+            shorten_largest_product(models[1], box_energy)
         self.graphs = [core.compile_model(m, "CPU", options).create_infer_request() for m in models]
         self.size = tuple(self.graphs[0].get_compiled_model().input(0).shape)[2:]
         self.refines = refine is not None
@@ -206,12 +224,12 @@ class OpenVino:
         return self.run(3, logits, features)
 
 
-def open_model(folder, threads=2, precision=None, int8=False, size=None, refine=True):
+def open_model(folder, threads=2, precision=None, int8=False, size=None, refine=True, box_energy=1.0):
     """A segmenter with what model.json of the folder says, and that. refine: masks are refined where the model can."""
     with open(os.path.join(folder, "model.json")) as f:
         m = json.load(f)
     graphs = OpenVino(folder, threads, precision, m["trunk_int8" if int8 else "trunk"], m["box"], m["mask"],
-                      m.get("refine") if refine else None, size)
+                      m.get("refine") if refine else None, size, box_energy)
     return Segmenter(graphs, m["semantic_share"], m["mask_threshold"], m["anchor_sizes"], m.get("fine_stride"), m.get("refine_margin")), m
 
 

@@ -39,7 +39,20 @@ struct RefineInput {
   std::span<float> features;  // kRefineSide x kRefineSide x fine_channels
 };
 
-/// The parts of a network as some inference library runs them. Not safe for concurrent use.
+/// The graphs that make one object's mask. One thread at a time, whatever the others do.
+class MaskGraphs {
+ public:
+  virtual ~MaskGraphs() = default;
+  /// Where the features of a region are to be written before mask_head().
+  virtual std::span<float> mask_input() = 0;
+  /// @return kMaskChannels x kMaskSide x kMaskSide probabilities.
+  virtual Result<std::span<const float>> mask_head() = 0;
+  /// The refinement of one region's mask. @return kRefineSide x kRefineSide probabilities, inside where >= 0.5.
+  virtual RefineInput refine_input() = 0;
+  virtual Result<std::span<const float>> refine_head() = 0;
+};
+
+/// The parts of a network as some inference library runs them. Not safe for concurrent use, but for its mask graphs.
 class NetworkGraphs {
  public:
   // Regions of one call of the box head (below 96 OpenVINO takes a kernel that makes 64 slower than 100); cells along
@@ -53,23 +66,26 @@ class NetworkGraphs {
   /// Where the features of kBoxBatch regions are to be written before box_head().
   virtual std::span<float> box_input() = 0;
   virtual Result<BoxHeadOutput> box_head() = 0;
-  /// The same for one region: an image has few. @return kMaskChannels x kMaskSide x kMaskSide probabilities.
-  virtual std::span<float> mask_input() = 0;
-  virtual Result<std::span<const float>> mask_head() = 0;
-  /// The refinement of one region's mask. @return kRefineSide x kRefineSide probabilities, inside where >= 0.5.
-  virtual RefineInput refine_input() = 0;
-  virtual Result<std::span<const float>> refine_head() = 0;
+  /// One object's mask after the other is made by each of these: an image has few. One or more, all alike.
+  virtual std::span<MaskGraphs* const> mask_graphs() = 0;
   virtual std::string description() const = 0;
 };
 
+struct GraphOptions {
+  /// "auto" (the float graphs in the fastest float type of the machine), "f32", or "int8": the trunk in eight bits,
+  /// which a model may lack.
+  std::string precision = "auto";
+  int threads = 1;
+  /// Share of the box head's weights, as a sum of squares, that is kept where its products can be made cheaper by half
+  /// (see factor()); 1 = all.
+  double box_energy = 1;
+};
+
+/// The trunk takes images of model.input, whatever it was exported for.
 /// Errors: a graph that cannot be read, or whose inputs and outputs differ from the description (the message names the
-/// tensor), or a build without OpenVINO (kUnsupported).
-/// @param precision "auto" (the float graphs in the fastest float type of the machine), "f32", or "int8": the trunk in
-/// eight bits, which a model may lack (kInvalidInput). The trunk takes images of model.input, whatever it was exported
-/// for.
+/// tensor), eight bits that the model lacks (kInvalidInput), or a build without OpenVINO (kUnsupported).
 Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
-                                                            const ModelDescription& model, const std::string& precision,
-                                                            int threads);
+                                                            const ModelDescription& model, const GraphOptions& options);
 /// The same by OpenCV's DNN module: slower, reads ONNX graphs only.
 Result<std::unique_ptr<NetworkGraphs>> make_opencv_graphs(const std::filesystem::path& folder,
                                                           const ModelDescription& model);

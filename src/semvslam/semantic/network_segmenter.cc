@@ -137,26 +137,27 @@ SemanticHint NetworkSegmenter::semantic_hint(const TrunkOutput& trunk, float sca
           scale_x / stride,      scale_y / stride, model_.semantic_share};
 }
 
-Result<NetworkSegmenter::RefinedMask> NetworkSegmenter::refine(const TrunkOutput& trunk, const MaskGrid& mask,
-                                                               float score, float threshold, const SemanticHint* hint) {
+Result<NetworkSegmenter::RefinedMask> NetworkSegmenter::refine(MaskGraphs& graphs, const TrunkOutput& trunk,
+                                                               const MaskGrid& mask, float score, float threshold,
+                                                               const SemanticHint* hint) const {
   const DetectionBox region = mask.box.grown(model_.refine_margin);
-  const RefineInput input = graphs_->refine_input();
+  const RefineInput input = graphs.refine_input();
   sample_mask(mask, region, NetworkGraphs::kRefineSide, hint, input.logits.data());
   // Of the mask before: a refined one is surer of itself, but ranks objects no better.
   const float certainty = mean_inside(input.logits, threshold);
   if (!(score * certainty >= limits_.score)) return RefinedMask{};
   bend_logits(input.logits, threshold);
   roi_align(trunk.fine, model_.fine_channels, region, NetworkGraphs::kRefineSide, input.features.data());
-  const Result<std::span<const float>> refined = graphs_->refine_head();
+  const Result<std::span<const float>> refined = graphs.refine_head();
   if (!refined) return refined.error();
   if (!finite(*refined)) return not_finite("refined masks");
   return RefinedMask{{refined->data(), NetworkGraphs::kRefineSide, region}, certainty};
 }
 
-Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Object& object, float scale_x, float scale_y,
-                                           cv::Size image) {
-  align_region(trunk, object.box, model_.mask_levels, NetworkGraphs::kMaskCells, graphs_->mask_input().data());
-  const Result<std::span<const float>> masks = graphs_->mask_head();
+Result<PastedMask> NetworkSegmenter::paste(MaskGraphs& graphs, const TrunkOutput& trunk, const Object& object,
+                                           float scale_x, float scale_y, cv::Size image) const {
+  align_region(trunk, object.box, model_.mask_levels, NetworkGraphs::kMaskCells, graphs.mask_input().data());
+  const Result<std::span<const float>> masks = graphs.mask_head();
   if (!masks) return masks.error();
   constexpr std::size_t kPixels = static_cast<std::size_t>(NetworkGraphs::kMaskSide) * NetworkGraphs::kMaskSide;
   const bool person = object.class_index == 0;
@@ -169,7 +170,7 @@ Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Objec
                       threshold, person ? &hint : nullptr);
   }
   const SemanticHint hint = semantic_hint(trunk, 1, 1);
-  Result<RefinedMask> refined = refine(trunk, {mask.data(), NetworkGraphs::kMaskSide, object.box}, object.score,
+  Result<RefinedMask> refined = refine(graphs, trunk, {mask.data(), NetworkGraphs::kMaskSide, object.box}, object.score,
                                        threshold, person ? &hint : nullptr);
   if (!refined) return refined.error();
   if (refined->certainty == 0) return PastedMask{};
@@ -179,17 +180,46 @@ Result<PastedMask> NetworkSegmenter::paste(const TrunkOutput& trunk, const Objec
   return pasted;
 }
 
+Result<std::vector<PastedMask>> NetworkSegmenter::paste_all(const TrunkOutput& trunk,
+                                                            const std::vector<Object>& objects, float scale_x,
+                                                            float scale_y, cv::Size image) {
+  const std::span<MaskGraphs* const> graphs = graphs_->mask_graphs();
+  std::vector<PastedMask> pasted(objects.size());
+  std::vector<Status> ended(graphs.size(), Status::success());
+  const auto work = [&](std::size_t lane) {
+    for (std::size_t n = lane; n < objects.size() && ended[lane]; n += graphs.size()) {
+      Result<PastedMask> one = paste(*graphs[lane], trunk, objects[n], scale_x, scale_y, image);
+      if (one)
+        pasted[n] = std::move(*one);
+      else
+        ended[lane] = one.error();
+    }
+  };
+  const std::size_t busy = std::min(graphs.size(), objects.size());
+  for (std::size_t lane = 1; lane < busy; ++lane) {
+    if (beside_.size() < lane) beside_.push_back(std::make_unique<SideTask>());
+    beside_[lane - 1]->start([&work, lane] { work(lane); });
+  }
+  if (busy > 0) work(0);
+  for (std::size_t lane = 1; lane < busy; ++lane) beside_[lane - 1]->wait();
+  for (const Status& s : ended)
+    if (!s) return s.error();
+  return pasted;
+}
+
 Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x,
                               float scale_y, Segmentation& out) {
   const auto lap = timers_["segment.masks"].time();
   if (!finite(trunk.semantic)) return not_finite("semantic map");
-  for (const Object& o : objects) {
-    const Result<PastedMask> pasted = paste(trunk, o, scale_x, scale_y, out.size);
-    if (!pasted) return pasted.error();
+  const Result<std::vector<PastedMask>> masks = paste_all(trunk, objects, scale_x, scale_y, out.size);
+  if (!masks) return masks.error();
+  for (std::size_t n = 0; n < objects.size(); ++n) {
+    const Object& o = objects[n];
+    const PastedMask& pasted = (*masks)[n];
     // With how sure its mask is (the "maskness" of X. Wang et al., SOLOv2, 2020) the score tells good objects from
     // doubtful ones better than by the box head alone.
-    const float score = o.score * pasted->certainty;
-    if (!(score >= limits_.score) || pasted->certainty == 0) continue;
+    const float score = o.score * pasted.certainty;
+    if (!(score >= limits_.score) || pasted.certainty == 0) continue;
     Instance i;
     i.class_index = o.class_index;
     i.class_name = model_.classes[static_cast<std::size_t>(o.class_index)];
@@ -197,8 +227,8 @@ Status NetworkSegmenter::draw(const TrunkOutput& trunk, const std::vector<Object
     i.score = score;
     const DetectionBox box = in_image(o.box, scale_x, scale_y, out.size);
     i.box = {box.x0, box.y0, box.width(), box.height()};
-    i.window = pasted->window;
-    i.mask = pasted->mask;
+    i.window = pasted.window;
+    i.mask = pasted.mask;
     out.instances.push_back(std::move(i));
   }
   std::stable_sort(out.instances.begin(), out.instances.end(),

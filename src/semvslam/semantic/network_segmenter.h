@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "semvslam/base/side_task.h"
 #include "semvslam/semantic/mask_paste.h"
 #include "semvslam/semantic/network_graphs.h"
 #include "semvslam/semantic/segmenter.h"
@@ -42,12 +43,15 @@ class NetworkSegmenter final : public Segmenter {
   Result<std::vector<DetectionBox>> propose(const TrunkOutput& trunk) const;
   Result<std::vector<Object>> classify(const TrunkOutput& trunk, const std::vector<DetectionBox>& proposals);
   SemanticHint semantic_hint(const TrunkOutput& trunk, float scale_x, float scale_y) const;
-  Result<PastedMask> paste(const TrunkOutput& trunk, const Object& object, float scale_x, float scale_y,
-                           cv::Size image);
+  Result<PastedMask> paste(MaskGraphs& graphs, const TrunkOutput& trunk, const Object& object, float scale_x,
+                           float scale_y, cv::Size image) const;
+  /// The masks of all objects, by as many threads as there are mask graphs; in the order of the objects.
+  Result<std::vector<PastedMask>> paste_all(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x,
+                                            float scale_y, cv::Size image);
   /// Sharpens a mask of the network's input with the trunk's fine features; what is returned is inside where >= 0.5.
   /// @param score the box head's; certainty is 0 and nothing is refined where the two would fall short of the least.
-  Result<RefinedMask> refine(const TrunkOutput& trunk, const MaskGrid& mask, float score, float threshold,
-                             const SemanticHint* hint);
+  Result<RefinedMask> refine(MaskGraphs& graphs, const TrunkOutput& trunk, const MaskGrid& mask, float score,
+                             float threshold, const SemanticHint* hint) const;
   Status draw(const TrunkOutput& trunk, const std::vector<Object>& objects, float scale_x, float scale_y,
               Segmentation& out);
   void align_region(const TrunkOutput& trunk, const DetectionBox& box, std::span<const float> levels, int cells,
@@ -61,6 +65,7 @@ class NetworkSegmenter final : public Segmenter {
   StageTimers& timers_;
   std::array<std::vector<DetectionBox>, ModelDescription::kLevels> anchors_;
   cv::Mat input_;
+  std::vector<std::unique_ptr<SideTask>> beside_;  // one for each mask graph but the first
 };
 
 }  // namespace semvslam

@@ -22,7 +22,7 @@ const fs::path kModels = fs::path(SEMVSLAM_SOURCE_DIR) / "models";
 SegmentationRequest request(cv::Mat image) { return {FrameId(0), TimeStamp{}, std::move(image), ""}; }
 
 /// Graphs without a network: features, scores and boxes are what a test sets.
-class FakeGraphs final : public NetworkGraphs {
+class FakeGraphs final : public NetworkGraphs, public MaskGraphs {
  public:
   explicit FakeGraphs(const ModelDescription& model) : classes_(model.classes.size()) {
     for (std::size_t l = 0; l < level_.size(); ++l) {
@@ -52,6 +52,7 @@ class FakeGraphs final : public NetworkGraphs {
   Result<TrunkOutput> trunk(const cv::Mat&) override { return out_; }
   std::span<float> box_input() override { return box_in_; }
   Result<BoxHeadOutput> box_head() override { return BoxHeadOutput{probabilities_, deltas_}; }
+  std::span<MaskGraphs* const> mask_graphs() override { return mask_graphs_; }
   std::span<float> mask_input() override { return mask_in_; }
   Result<std::span<const float>> mask_head() override { return std::span<const float>(masks_); }
   RefineInput refine_input() override { return {logits_in_, fine_in_}; }
@@ -69,6 +70,7 @@ class FakeGraphs final : public NetworkGraphs {
   std::size_t classes_;
   TrunkOutput out_;
   std::vector<float> box_in_, mask_in_;
+  const std::array<MaskGraphs*, 1> mask_graphs_{this};
 };
 
 ModelDescription small_model() {
@@ -375,11 +377,30 @@ TEST_F(ShippedNetwork, BesideACameraTheProcessorDecidesWhichTrunkAndHowWide) {
   }
 }
 
+TEST_F(ShippedNetwork, ACheaperBoxHeadFindsTheSamePersons) {
+  const Result<ModelDescription> model = ModelDescription::read(kModels);
+  ASSERT_TRUE(model) << model.error().message;
+  const cv::Mat picture = cv::imread((kModels / "golden" / "people.jpg").string());
+  const auto persons = [&](double energy) {
+    auto graphs = make_openvino_graphs(kModels, *model, {"f32", 1, energy});
+    if (!graphs) throw std::runtime_error(graphs.error().message);
+    NetworkSegmenter segmenter(std::move(*graphs), *model, {}, RoleTable(), nullptr);
+    const auto s = segmenter.segment(request(picture));
+    if (!s) throw std::runtime_error(s.error().message);
+    return std::pair(s->mask_of_class("person"), s->instances.at(0).score);
+  };
+  const auto [whole, score] = persons(1);
+  const auto [cheap, score_of_cheap] = persons(0.88);
+  EXPECT_NE(score, score_of_cheap);  // it is another head
+  EXPECT_NEAR(score, score_of_cheap, 0.05);
+  EXPECT_GT(cv::countNonZero(whole & cheap), 0.95 * cv::countNonZero(whole | cheap));
+}
+
 TEST_F(ShippedNetwork, EightBitsThatTheModelLacksAreAnError) {
   Result<ModelDescription> model = ModelDescription::read(kModels);
   ASSERT_TRUE(model);
   model->trunk_int8.clear();
-  const auto graphs = make_openvino_graphs(kModels, *model, "int8", 1);
+  const auto graphs = make_openvino_graphs(kModels, *model, {"int8"});
   ASSERT_FALSE(graphs);
   EXPECT_EQ(graphs.error().code, ErrorCode::kInvalidInput);
   EXPECT_THAT(graphs.error().message, HasSubstr("trunk_int8"));
@@ -390,22 +411,22 @@ TEST_F(ShippedNetwork, AWrongGraphIsNamed) {
   ASSERT_TRUE(model);
   ModelDescription swapped = *model;
   std::swap(swapped.box, swapped.mask);
-  auto graphs = make_openvino_graphs(kModels, swapped, "f32", 1);
+  auto graphs = make_openvino_graphs(kModels, swapped, {"f32"});
   ASSERT_FALSE(graphs);
   EXPECT_THAT(graphs.error().message, HasSubstr("'rois'"));
   ModelDescription fewer = *model;
   fewer.classes.pop_back();
-  graphs = make_openvino_graphs(kModels, fewer, "f32", 1);
+  graphs = make_openvino_graphs(kModels, fewer, {"f32"});
   ASSERT_FALSE(graphs);
   EXPECT_THAT(graphs.error().message, HasSubstr("'probabilities'"));
   ModelDescription wider = *model;
   ++wider.fine_channels;
-  graphs = make_openvino_graphs(kModels, wider, "f32", 1);
+  graphs = make_openvino_graphs(kModels, wider, {"f32"});
   ASSERT_FALSE(graphs);
   EXPECT_THAT(graphs.error().message, HasSubstr("'fine'"));
   swapped = *model;
   swapped.refine = swapped.box;
-  graphs = make_openvino_graphs(kModels, swapped, "f32", 1);
+  graphs = make_openvino_graphs(kModels, swapped, {"f32"});
   ASSERT_FALSE(graphs);
   EXPECT_THAT(graphs.error().message, HasSubstr("'logits'"));
 }

@@ -8,7 +8,7 @@
 namespace semvslam {
 namespace {
 
-class OpenCvGraphs final : public NetworkGraphs {
+class OpenCvGraphs final : public NetworkGraphs, public MaskGraphs {
  public:
   OpenCvGraphs(const std::filesystem::path& folder, const ModelDescription& model)
       : model_(model),
@@ -68,6 +68,7 @@ class OpenCvGraphs final : public NetworkGraphs {
   }
 
   std::span<float> box_input() override { return {box_in_.ptr<float>(), box_in_.total()}; }
+  std::span<MaskGraphs* const> mask_graphs() override { return masks_; }
   std::span<float> mask_input() override { return {mask_in_.ptr<float>(), mask_in_.total()}; }
 
   Result<BoxHeadOutput> box_head() override {
@@ -142,6 +143,7 @@ class OpenCvGraphs final : public NetworkGraphs {
   cv::dnn::Net trunk_, box_, mask_, refine_;
   cv::Mat box_in_, mask_in_, mask_out_, logits_in_, fine_in_, refined_;
   std::vector<cv::Mat> outputs_, box_out_;
+  const std::array<MaskGraphs*, 1> masks_{this};
 };
 
 }  // namespace

@@ -8,7 +8,11 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <openvino/op/constant.hpp>
+#include <openvino/op/matmul.hpp>
 #include <openvino/openvino.hpp>
+
+#include "semvslam/semantic/low_rank.h"
 
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -55,12 +59,152 @@ std::size_t count(const Shape& shape) {
   return n;
 }
 
+template <typename Action>
+Status run(Action action) {
+  try {
+    action();
+  } catch (const std::exception& e) {
+    return Error{ErrorCode::kInternal, fmt::format("OpenVINO: {}", e.what())};
+  }
+  return Status::success();
+}
+
+std::shared_ptr<ov::Model> read(const std::filesystem::path& file) { return core().read_model(file.string()); }
+
+ov::CompiledModel compile(const std::shared_ptr<ov::Model>& m, const ov::AnyMap& options) {
+  return core().compile_model(m, "CPU", options);
+}
+
+using Inputs = std::map<std::string, ov::PartialShape>;
+
+void check_inputs(const std::shared_ptr<ov::Model>& m, const Inputs& wanted) {
+  std::map<std::string, ov::PartialShape> own;
+  for (const auto& i : m->inputs())
+    for (const std::string& name : i.get_names()) own.emplace(name, i.get_partial_shape());
+  std::vector<std::string> names;
+  bool complete = m->inputs().size() == wanted.size();
+  for (const auto& [name, shape] : wanted) {
+    names.push_back(fmt::format("'{}'", name));
+    complete &= own.contains(name);
+  }
+  if (!complete)
+    throw WrongTensor(fmt::format("expected {} input{}, named {}", wanted.size(), wanted.size() == 1 ? "" : "s",
+                                  fmt::join(names, ", ")));
+  for (const auto& [name, shape] : wanted)
+    if (!own.at(name).compatible(shape))
+      throw WrongTensor(
+          fmt::format("input '{}' has the shape {}, expected {}", name, own.at(name).to_string(), shape.to_string()));
+}
+
+/// Replaces the largest product with a constant matrix by two that together take half the operations or less, where
+/// there are such: see factor(). The last products, of classes and boxes, are small, and every rank of theirs counts.
+void shorten_largest_product(const std::shared_ptr<ov::Model>& m, double energy) {
+  std::shared_ptr<ov::op::v0::MatMul> largest;
+  std::shared_ptr<ov::op::v0::Constant> weights;
+  for (const std::shared_ptr<ov::Node>& node : m->get_ordered_ops()) {
+    const auto product = ov::as_type_ptr<ov::op::v0::MatMul>(node);
+    if (!product || product->get_transpose_a() || !product->get_transpose_b()) continue;
+    const auto right = ov::as_type_ptr<ov::op::v0::Constant>(product->get_input_node_shared_ptr(1));
+    if (!right || right->get_element_type() != ov::element::f32 || right->get_shape().size() != 2) continue;
+    if (weights && count(right->get_shape()) <= count(weights->get_shape())) continue;
+    largest = product;
+    weights = right;
+  }
+  if (!largest) return;
+  const std::optional<LowRank> factors =
+      factor(Eigen::Map<const RowMajorMatrix>(weights->get_data_ptr<float>(),
+                                              static_cast<Eigen::Index>(weights->get_shape()[0]),
+                                              static_cast<Eigen::Index>(weights->get_shape()[1])),
+             energy);
+  if (!factors) return;
+  const auto times = [](const ov::Output<ov::Node>& left, const RowMajorMatrix& right) {
+    const Shape shape{static_cast<std::size_t>(right.rows()), static_cast<std::size_t>(right.cols())};
+    const auto constant = std::make_shared<ov::op::v0::Constant>(ov::element::f32, shape, right.data());
+    return std::make_shared<ov::op::v0::MatMul>(left, constant, false, true);
+  };
+  ov::replace_node(largest, times(times(largest->input_value(0), factors->wide), factors->high));
+}
+
+ov::InferRequest load_graph(const std::filesystem::path& file, const Inputs& inputs, const ov::AnyMap& options,
+                            double energy = 1) {
+  try {
+    const std::shared_ptr<ov::Model> m = read(file);
+    check_inputs(m, inputs);
+    m->reshape(inputs);
+    if (energy < 1) shorten_largest_product(m, energy);
+    return compile(m, options).create_infer_request();
+  } catch (const std::exception& e) {
+    throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
+  }
+}
+
+std::span<float> input(ov::InferRequest& request, const std::string& name) {
+  ov::Tensor t = request.get_tensor(name);
+  return {t.data<float>(), t.get_size()};
+}
+
+ov::Tensor checked(ov::InferRequest& request, const std::string& file, const std::string& name,
+                   const ov::element::Type& type, const Shape& wanted) {
+  ov::Tensor t;
+  try {
+    t = request.get_tensor(name);
+  } catch (const std::exception&) {
+    throw WrongTensor(fmt::format("{}: there is no output '{}'", file, name));
+  }
+  if (t.get_element_type() != type || t.get_shape() != ov::Shape(wanted))
+    throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected {} [{}]", file, name,
+                                  t.get_element_type().to_string(), t.get_shape().to_string(), type.to_string(),
+                                  fmt::join(wanted, ",")));
+  return t;
+}
+
+/// Output memory does not move between calls: shapes are fixed.
+std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name,
+                              const Shape& wanted) {
+  return {checked(request, file, name, ov::element::f32, wanted).data<float>(), count(wanted)};
+}
+
+class OpenVinoMaskGraphs final : public MaskGraphs {
+ public:
+  OpenVinoMaskGraphs(const std::filesystem::path& folder, const ModelDescription& model, const ov::AnyMap& options) {
+    constexpr std::size_t kCells = NetworkGraphs::kMaskCells, kSide = NetworkGraphs::kMaskSide;
+    mask_ = load_graph(folder / model.mask, {{"rois", {1, kCells, kCells, model.channels}}}, options);
+    masks_ = output(mask_, model.mask, "masks", {1, NetworkGraphs::kMaskChannels, kSide, kSide});
+    if (model.refine.empty()) return;
+    constexpr std::size_t kRefined = NetworkGraphs::kRefineSide;
+    refine_ = load_graph(
+        folder / model.refine,
+        {{"logits", {1, kRefined, kRefined}}, {"features", {1, kRefined, kRefined, model.fine_channels}}}, options);
+    refined_ = output(refine_, model.refine, "masks", {1, kRefined, kRefined});
+    refine_in_ = {input(refine_, "logits"), input(refine_, "features")};
+  }
+
+  std::span<float> mask_input() override { return input(mask_, "rois"); }
+  RefineInput refine_input() override { return refine_in_; }
+
+  Result<std::span<const float>> mask_head() override {
+    if (Status s = run([&] { mask_.infer(); }); !s) return s.error();
+    return masks_;
+  }
+
+  Result<std::span<const float>> refine_head() override {
+    if (Status s = run([&] { refine_.infer(); }); !s) return s.error();
+    return refined_;
+  }
+
+ private:
+  ov::InferRequest mask_, refine_;
+  std::span<const float> masks_, refined_;
+  RefineInput refine_in_;
+};
+
 class OpenVinoGraphs final : public NetworkGraphs {
  public:
-  OpenVinoGraphs(const std::filesystem::path& folder, const ModelDescription& model, const std::string& precision,
-                 int threads)
+  OpenVinoGraphs(const std::filesystem::path& folder, const ModelDescription& model, const GraphOptions& wanted)
       : model_(model) {
-    ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(threads), ov::hint::enable_cpu_pinning(false)};
+    const std::string& precision = wanted.precision;
+    ov::AnyMap options{ov::num_streams(1), ov::inference_num_threads(wanted.threads),
+                       ov::hint::enable_cpu_pinning(false)};
     // OpenVINO would take bfloat16 wherever it exists, also where it is slower.
     if (precision == "f32" || fast_numbers() != FastNumbers::kShortFloats)
       options.insert(ov::hint::inference_precision(ov::element::f32));
@@ -76,18 +220,14 @@ class OpenVinoGraphs final : public NetworkGraphs {
     // The heads' matrix products sum in another order with another number of threads; a trunk's convolutions do not.
     options[ov::inference_num_threads.name()] = 1;
     const ov::Dimension c = model.channels;
-    box_ = load_graph(folder / model.box, {{"rois", {kBoxBatch, kBoxCells, kBoxCells, c}}}, options);
+    box_ = load_graph(folder / model.box, {{"rois", {kBoxBatch, kBoxCells, kBoxCells, model.channels}}}, options,
+                      wanted.box_energy);
     probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
     box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
-    mask_ = load_graph(folder / model.mask, {{"rois", {1, kMaskCells, kMaskCells, c}}}, options);
-    masks_ = output(mask_, model.mask, "masks", {1, kMaskChannels, kMaskSide, kMaskSide});
-    if (model.refine.empty()) return;
-    constexpr std::size_t kSide = kRefineSide;
-    refine_ =
-        load_graph(folder / model.refine,
-                   {{"logits", {1, kSide, kSide}}, {"features", {1, kSide, kSide, model.fine_channels}}}, options);
-    refined_ = output(refine_, model.refine, "masks", {1, kSide, kSide});
-    refine_in_ = {input(refine_, "logits"), input(refine_, "features")};
+    for (int lane = 0; lane < std::min(wanted.threads, kMaskLanes); ++lane) {
+      owned_masks_.push_back(std::make_unique<OpenVinoMaskGraphs>(folder, model, options));
+      masks_.push_back(owned_masks_.back().get());
+    }
   }
 
   Result<TrunkOutput> trunk(const cv::Mat& image) override {
@@ -106,22 +246,11 @@ class OpenVinoGraphs final : public NetworkGraphs {
   }
 
   std::span<float> box_input() override { return input(box_, "rois"); }
-  std::span<float> mask_input() override { return input(mask_, "rois"); }
-  RefineInput refine_input() override { return refine_in_; }
+  std::span<MaskGraphs* const> mask_graphs() override { return masks_; }
 
   Result<BoxHeadOutput> box_head() override {
     if (Status s = run([&] { box_.infer(); }); !s) return s.error();
     return BoxHeadOutput{probabilities_, box_deltas_};
-  }
-
-  Result<std::span<const float>> mask_head() override {
-    if (Status s = run([&] { mask_.infer(); }); !s) return s.error();
-    return masks_;
-  }
-
-  Result<std::span<const float>> refine_head() override {
-    if (Status s = run([&] { refine_.infer(); }); !s) return s.error();
-    return refined_;
   }
 
   std::string description() const override {
@@ -130,42 +259,7 @@ class OpenVinoGraphs final : public NetworkGraphs {
   }
 
  private:
-  template <typename Action>
-  static Status run(Action action) {
-    try {
-      action();
-    } catch (const std::exception& e) {
-      return Error{ErrorCode::kInternal, fmt::format("OpenVINO: {}", e.what())};
-    }
-    return Status::success();
-  }
-
-  static std::shared_ptr<ov::Model> read(const std::filesystem::path& file) { return core().read_model(file.string()); }
-
-  static ov::CompiledModel compile(const std::shared_ptr<ov::Model>& m, const ov::AnyMap& options) {
-    return core().compile_model(m, "CPU", options);
-  }
-
-  using Inputs = std::map<std::string, ov::PartialShape>;
-
-  static void check_inputs(const std::shared_ptr<ov::Model>& m, const Inputs& wanted) {
-    std::map<std::string, ov::PartialShape> own;
-    for (const auto& i : m->inputs())
-      for (const std::string& name : i.get_names()) own.emplace(name, i.get_partial_shape());
-    std::vector<std::string> names;
-    bool complete = m->inputs().size() == wanted.size();
-    for (const auto& [name, shape] : wanted) {
-      names.push_back(fmt::format("'{}'", name));
-      complete &= own.contains(name);
-    }
-    if (!complete)
-      throw WrongTensor(fmt::format("expected {} input{}, named {}", wanted.size(), wanted.size() == 1 ? "" : "s",
-                                    fmt::join(names, ", ")));
-    for (const auto& [name, shape] : wanted)
-      if (!own.at(name).compatible(shape))
-        throw WrongTensor(
-            fmt::format("input '{}' has the shape {}, expected {}", name, own.at(name).to_string(), shape.to_string()));
-  }
+  static constexpr int kMaskLanes = 2;  // more would seldom have a third person to work on
 
   void load_trunk(const std::filesystem::path& file, const ov::AnyMap& options) {
     try {
@@ -236,61 +330,24 @@ class OpenVinoGraphs final : public NetworkGraphs {
     return {short_outputs_.back().floats.data(), rows, columns, stride};
   }
 
-  static ov::InferRequest load_graph(const std::filesystem::path& file, const Inputs& inputs,
-                                     const ov::AnyMap& options) {
-    try {
-      const std::shared_ptr<ov::Model> m = read(file);
-      check_inputs(m, inputs);
-      m->reshape(inputs);
-      return compile(m, options).create_infer_request();
-    } catch (const std::exception& e) {
-      throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
-    }
-  }
-
-  static std::span<float> input(ov::InferRequest& request, const std::string& name) {
-    ov::Tensor t = request.get_tensor(name);
-    return {t.data<float>(), t.get_size()};
-  }
-
-  /// Output memory does not move between calls: shapes are fixed.
-  static std::span<const float> output(ov::InferRequest& request, const std::string& file, const std::string& name,
-                                       const Shape& wanted) {
-    return {checked(request, file, name, ov::element::f32, wanted).data<float>(), count(wanted)};
-  }
-
-  static ov::Tensor checked(ov::InferRequest& request, const std::string& file, const std::string& name,
-                            const ov::element::Type& type, const Shape& wanted) {
-    ov::Tensor t;
-    try {
-      t = request.get_tensor(name);
-    } catch (const std::exception&) {
-      throw WrongTensor(fmt::format("{}: there is no output '{}'", file, name));
-    }
-    if (t.get_element_type() != type || t.get_shape() != ov::Shape(wanted))
-      throw WrongTensor(fmt::format("{}: output '{}' is {} {}, expected {} [{}]", file, name,
-                                    t.get_element_type().to_string(), t.get_shape().to_string(), type.to_string(),
-                                    fmt::join(wanted, ",")));
-    return t;
-  }
-
   ModelDescription model_;
   std::string trunk_name_;
-  ov::InferRequest trunk_, box_, mask_, refine_;
+  ov::InferRequest trunk_, box_;
   bool short_features_ = false;
   std::vector<ShortOutput> short_outputs_;  // a moved one keeps its memory
   TrunkOutput trunk_out_;
-  std::span<const float> probabilities_, box_deltas_, masks_, refined_;
-  RefineInput refine_in_;
+  std::span<const float> probabilities_, box_deltas_;
+  std::vector<std::unique_ptr<OpenVinoMaskGraphs>> owned_masks_;
+  std::vector<MaskGraphs*> masks_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path& folder,
-                                                            const ModelDescription& model, const std::string& precision,
-                                                            int threads) {
+                                                            const ModelDescription& model,
+                                                            const GraphOptions& options) {
   try {
-    return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenVinoGraphs>(folder, model, precision, threads));
+    return std::unique_ptr<NetworkGraphs>(std::make_unique<OpenVinoGraphs>(folder, model, options));
   } catch (const std::exception& e) {
     return Error{ErrorCode::kInvalidInput, e.what()};
   }
@@ -318,7 +375,7 @@ FastNumbers fast_numbers() {
 namespace semvslam {
 
 Result<std::unique_ptr<NetworkGraphs>> make_openvino_graphs(const std::filesystem::path&, const ModelDescription&,
-                                                            const std::string&, int) {
+                                                            const GraphOptions&) {
   return Error{ErrorCode::kUnsupported, "this build has no OpenVINO: `pip install openvino`, then configure again"};
 }
 

@@ -28,18 +28,17 @@ constexpr double kEightBitWidth = 0.8;      // with instructions for eight bits:
 // Where no camera waits: finds more small persons for half as much time again (in eight bits it does not).
 constexpr double kStillsWidth = 1.2;
 
-struct Settled {
-  std::string precision;
-  int threads;
-};
+// Of the box head's weights, beside a camera: a third of the operations, and the same persons found.
+constexpr double kKeepUpBoxEnergy = 0.88;
 
 /// What suits the machine, where the options leave it open; the size of the model's input too.
-Settled settle(const SegmenterOptions& options, bool openvino, ModelDescription& model) {
+GraphOptions settle(const SegmenterOptions& options, bool openvino, ModelDescription& model) {
   const FastNumbers fast = openvino ? fast_numbers() : FastNumbers::kShortFloats;
   // There the network is what all else waits for. Elsewhere a second thread, beside tracking and mapping, only waits.
   const bool slow = fast != FastNumbers::kShortFloats;
   const int threads = options.threads > 0 ? options.threads : slow ? 2 : 1;
-  Settled out{options.precision, threads};
+  GraphOptions out{options.precision, threads};
+  if (options.keep_up && options.precision == "auto") out.box_energy = kKeepUpBoxEnergy;
   int width_px = options.input_width_px;
   if (slow && options.keep_up && options.precision == "auto") {
     out.precision = model.trunk_int8.empty() ? "f32" : "int8";
@@ -65,10 +64,9 @@ Result<std::unique_ptr<Segmenter>> make_network(const SegmenterOptions& options,
     return Error{ErrorCode::kUnsupported,
                  "segment.input_width_px and segment.precision=int8 need OpenVINO; OpenCV runs the network as it was "
                  "exported"};
-  const Settled settled = settle(options, openvino, *model);
+  const GraphOptions settled = settle(options, openvino, *model);
   Result<std::unique_ptr<NetworkGraphs>> graphs =
-      openvino ? make_openvino_graphs(*folder, *model, settled.precision, settled.threads)
-               : make_opencv_graphs(*folder, *model);
+      openvino ? make_openvino_graphs(*folder, *model, settled) : make_opencv_graphs(*folder, *model);
   if (!graphs) return graphs.error();
   NetworkSegmenter::Limits limits;
   limits.score = static_cast<float>(options.score);
