@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -65,15 +66,29 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::size_
   return text;
 }
 
-Status read_binary_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes) {
+Status read_binary_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes, std::size_t at_most) {
   InputFile file;
   if (Status s = file.open(path); !s) return s;
   if (file.size == 0) return Error{ErrorCode::kInvalidInput, path.string() + ": the file is empty"};
-  bytes.resize(file.size);
+  bytes.resize(std::min(file.size, at_most));
   return file.read(path, reinterpret_cast<char*>(bytes.data()), bytes.size());
 }
 
+namespace {
+
+Status write_through(const std::filesystem::path& path, std::string_view content) {
+  Result<OutputFile> file = OutputFile::create(path);
+  if (!file) return file.error();
+  if (Status s = file->write(content); !s) return s;
+  return file->close();
+}
+
+}  // namespace
+
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content) {
+  std::error_code unseen;  // what cannot be looked at cannot be replaced either: said below
+  const std::filesystem::file_status there = std::filesystem::status(path, unseen);
+  if (std::filesystem::is_character_file(there) || std::filesystem::is_fifo(there)) return write_through(path, content);
   // The process id keeps two programs that write the same file apart.
   const std::filesystem::path temporary = fmt::format("{}.{}.part", path.string(), ::getpid());
   const auto fail = [&](const Error& error) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,12 +14,15 @@ namespace semvslam {
 /// A whole file as text. Errors: missing, a folder, unreadable, larger than `max_bytes` (a wrong file, not a list).
 Result<std::string> read_text_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{1} << 30);
 
-/// A whole file as bytes into `bytes` (its memory is reused). Errors as above; an empty file is an Error too.
-Status read_binary_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes);
+/// A whole file as bytes into `bytes` (its memory is reused), or its first `at_most`. Errors as above; an empty file is
+/// an Error too.
+Status read_binary_file(const std::filesystem::path& path, std::vector<std::uint8_t>& bytes,
+                        std::size_t at_most = std::numeric_limits<std::size_t>::max());
 
 /// Replaces `path` by `content` in one step: readers see the old file or the new one, never a part, also after a crash
 /// (a neighbouring temporary file is written, flushed to the disk, renamed). Errors: folder missing or not writable,
-/// disk full; the old file is then untouched and the temporary one removed.
+/// disk full; the old file is then untouched and the temporary one removed. A device or a pipe is written to, not
+/// replaced.
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
 /// Makes a folder and those above it; one that is there already is fine. Errors: not possible, a file of that name.

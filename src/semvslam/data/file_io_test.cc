@@ -81,6 +81,18 @@ TEST(WriteFileAtomically, SaysWhereItCannotWrite) {
   EXPECT_EQ(files_in(folder), 1u);
 }
 
+TEST(WriteFileAtomically, ADeviceStaysOne) {
+  const std::filesystem::path null = "/dev/null", full = "/dev/full";
+  EXPECT_TRUE(write_file_atomically(null, "x").ok());
+  EXPECT_TRUE(std::filesystem::is_character_file(null));
+  if (!std::filesystem::exists(full)) GTEST_SKIP() << "this system has no /dev/full";
+  const Status status = write_file_atomically(full, "x");
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kIo);
+  EXPECT_THAT(status.error().message, HasSubstr("/dev/full: cannot write"));
+  EXPECT_TRUE(std::filesystem::is_character_file(full));
+}
+
 TEST(ReadFile, ReadsWholeFilesAndRefusesOthers) {
   TemporaryFolder folder;
   write_text(folder / "f", std::string("a\0b", 3));
@@ -89,6 +101,8 @@ TEST(ReadFile, ReadsWholeFilesAndRefusesOthers) {
   std::vector<std::uint8_t> bytes(100);
   ASSERT_TRUE(read_binary_file(folder / "f", bytes).ok());
   EXPECT_EQ(bytes.size(), 3u);
+  ASSERT_TRUE(read_binary_file(folder / "f", bytes, 2).ok());
+  EXPECT_EQ(bytes, (std::vector<std::uint8_t>{'a', '\0'}));
   EXPECT_EQ(read_binary_file(folder / "g", bytes).error().code, ErrorCode::kNotFound);
   EXPECT_THAT(read_binary_file(folder.path(), bytes).error().message, HasSubstr("is not a file"));
   write_text(folder / "empty", "");
