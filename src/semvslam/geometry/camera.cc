@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace semvslam {
 namespace {
@@ -55,6 +57,20 @@ Eigen::Vector2d Camera::undistort(const Eigen::Vector2d& recorded) const {
     error = next_error;
   }
   return {fx_px * n.x() + cx_px, fy_px * n.y() + cy_px};
+}
+
+double Camera::largest_shift_px(const Camera& other) const {
+  constexpr int kSteps = 8;
+  double largest = 0;
+  for (int row = 0; row <= kSteps; ++row)
+    for (int column = 0; column <= kSteps; ++column) {
+      const Eigen::Vector2d pixel(column * (width_px - 1.0) / kSteps, row * (height_px - 1.0) / kSteps);
+      const Eigen::Vector3d ray = back_project(undistort(pixel), 1);
+      const double shift = (other.distort(other.project(ray)) - pixel).norm();
+      if (!std::isfinite(shift)) return std::numeric_limits<double>::infinity();
+      largest = std::max(largest, shift);
+    }
+  return largest;
 }
 
 Status Camera::check() const {

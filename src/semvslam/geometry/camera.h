@@ -41,6 +41,10 @@ struct Camera {
   /// Recorded pixel -> ideal pixel: damped Newton iteration; where the lens model has no inverse, the nearest found.
   Eigen::Vector2d undistort(const Eigen::Vector2d& recorded) const;
 
+  /// How far apart this camera and another one of the same size see the same thing at most, pixels: over a grid of
+  /// recorded pixels of this one. Infinite where the lens model has no answer.
+  double largest_shift_px(const Camera& other) const;
+
   /// Sizes 16..16384, focal lengths finite and positive, principal point inside the image, depth factor positive.
   Status check() const;
 };

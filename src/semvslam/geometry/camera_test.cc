@@ -73,6 +73,20 @@ TEST(Camera, DistortFollowsTheFormula) {
   EXPECT_NEAR(got.y(), c.fy_px * yd + c.cy_px, 1e-10);
 }
 
+TEST(Camera, HowFarApartTwoCamerasSeeTheSame) {
+  Camera lens = pinhole();
+  lens.distortion = {0.2624, -0.9531, -0.0054, 0.0026, 1.1633};
+  EXPECT_LT(lens.largest_shift_px(lens), 1e-6);
+  Camera moved = lens;
+  moved.cy_px += 3;
+  EXPECT_NEAR(lens.largest_shift_px(moved), 3, 1e-6);
+  EXPECT_NEAR(moved.largest_shift_px(lens), 3, 1e-6);
+  Camera longer = pinhole();
+  longer.fx_px *= 1.01;  // at the border that is farther from the centre, 320.4 px
+  EXPECT_NEAR(pinhole().largest_shift_px(longer), 3.204, 1e-3);
+  EXPECT_GT(pinhole().largest_shift_px(lens), 5) << "the lens alone";
+}
+
 TEST(Camera, CheckNamesWhatIsWrong) {
   EXPECT_TRUE(pinhole().check().ok());
   const auto complains = [](auto change, const char* word) {

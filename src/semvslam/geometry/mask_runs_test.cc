@@ -51,6 +51,33 @@ TEST(MaskRuns, AMaskOfPersonsTakesFewKilobytes) {
   EXPECT_LT(MaskRuns(mask).memory_bytes(), 8192U);
 }
 
+TEST(MaskRuns, IsMadeOfTheRunsOfItsRows) {
+  cv::Mat mask = cv::Mat::zeros(6, 20, CV_8UC1);
+  mask(cv::Rect(2, 1, 3, 4)).setTo(255);
+  mask(cv::Rect(6, 2, 14, 1)).setTo(255);
+  const MaskRuns runs(mask);
+  std::vector<std::vector<MaskRuns::Run>> rows;
+  for (int y = 0; y < mask.rows; ++y) rows.emplace_back(runs.row(y).begin(), runs.row(y).end());
+  EXPECT_EQ(rows[2].size(), 2u);
+  const std::optional<MaskRuns> again = MaskRuns::of_rows(mask.size(), rows);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(cv::norm(again->mask(), mask, cv::NORM_INF), 0);
+  EXPECT_TRUE(MaskRuns::of_rows({}, {}));
+}
+
+TEST(MaskRuns, RunsThatNoMaskHasAreRefused) {
+  const cv::Size size(20, 1);
+  const auto is_mask = [&](std::vector<MaskRuns::Run> row) { return MaskRuns::of_rows(size, {row}).has_value(); };
+  EXPECT_TRUE(is_mask({{0, 4}, {5, 20}}));
+  EXPECT_FALSE(is_mask({{0, 4}, {4, 6}})) << "one run, not two";
+  EXPECT_FALSE(is_mask({{5, 8}, {0, 2}}));
+  EXPECT_FALSE(is_mask({{5, 5}}));
+  EXPECT_FALSE(is_mask({{5, 21}}));
+  EXPECT_FALSE(MaskRuns::of_rows(size, {})) << "a row is missing";
+  EXPECT_FALSE(MaskRuns::of_rows({70000, 1}, {{}}));
+  EXPECT_FALSE(MaskRuns::of_rows({-3, 1}, {{}}));
+}
+
 TEST(MaskRuns, AnotherTypeIsAProgrammingError) {
   EXPECT_THROW(MaskRuns(cv::Mat(4, 4, CV_16UC1, cv::Scalar(1))), std::invalid_argument);
 }

@@ -20,6 +20,13 @@ class SE3 {
       : rotation_(rotation.normalized()), translation_(translation) {}
   SE3(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation)
       : SE3(Eigen::Quaterniond(rotation), translation) {}
+  /// Taken as it is, bit by bit: what another SE3 held before. @param rotation of unit length.
+  static SE3 from_unit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+    SE3 out;
+    out.rotation_ = rotation;
+    out.translation_ = translation;
+    return out;
+  }
 
   const Eigen::Quaterniond& rotation() const { return rotation_; }
   const Eigen::Vector3d& translation() const { return translation_; }

@@ -26,6 +26,16 @@ Eigen::Matrix4d matrix(const SE3& pose) {
   return m;
 }
 
+TEST(SE3, FromUnitKeepsEveryBit) {
+  Random random(3, "unit");
+  for (int i = 0; i < 100; ++i) {
+    const SE3 pose = SE3::exp(random_tangent(random, 1.0 + 0.01 * i));
+    const SE3 copy = SE3::from_unit(pose.rotation(), pose.translation());
+    EXPECT_EQ(copy.rotation().coeffs(), pose.rotation().coeffs());
+    EXPECT_EQ(copy.translation(), pose.translation());
+  }
+}
+
 TEST(Skew, IsTheCrossProduct) {
   const Eigen::Vector3d a(1, -2, 3), b(0.5, 4, -1);
   EXPECT_EQ(skew(a) * b, a.cross(b));
