@@ -19,7 +19,7 @@ ALLOWED = {
     "solve": {"geometry"},
     "data": {"geometry"},
     "render": {"data", "geometry"},
-    "map": {"geometry", "feature", "solve"},  # solve: the plain observation types that the solvers take
+    "map": {"geometry", "data", "feature", "solve"},  # solve: the plain observation types that the solvers take; data: files
     "eval": {"geometry", "data"},
     "place": {"feature", "geometry"},
     "motion": {"feature", "geometry"},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace semvslam {
@@ -22,6 +23,19 @@ Eigen::Vector3d viewing_direction(const SE3& camera_from_world) {
 
 const LocalMap::Point* LocalMap::find(LandmarkId id) const { return find_by_id(points, id); }
 const LocalMap::KeyFramePose* LocalMap::find(KeyFrameId id) const { return find_by_id(key_frames, id); }
+
+KeyFrameId LocalMap::nearest(const SE3& camera_from_world) const {
+  constexpr double kMetresPerRad = 1.0 / (40.0 * std::numbers::pi / 180.0);
+  const auto distance = [&](const KeyFramePose& key_frame) {
+    const SE3 between = camera_from_world * key_frame.camera_from_world.inverse();
+    return between.translation().norm() + kMetresPerRad * between.rotation_angle_rad();
+  };
+  KeyFrameId best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const KeyFramePose& key_frame : key_frames)
+    if (const double d = distance(key_frame); d < least) least = d, best = key_frame.id;
+  return best;
+}
 
 std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, const LocalMapOptions& options,
                                           const std::vector<KeyFrameId>& except) {
@@ -48,7 +62,7 @@ std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, 
 std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId reference, const LocalMapOptions& options) {
   auto local = std::make_shared<LocalMap>();
   local->reference = reference;
-  local->reference_frame = map.key_frame(reference)->frame;
+  if (reference >= map.first_of_session()) local->reference_frame = map.key_frame(reference)->frame;
   std::vector<KeyFrameId> window{reference};
   for (const Covisible& c : map.covisible(reference, 1)) {
     if (window.size() > static_cast<std::size_t>(options.covisible_key_frames)) break;

@@ -25,15 +25,17 @@ struct LocalMap {
     int landmarks = 0;  // that it sees
   };
 
-  KeyFrameId reference;                                  // the key frame it was made around
-  FrameId reference_frame;                               // the frame that the reference was
-  int reference_matches = 0;                             // landmarks that the reference sees
-  std::vector<Point> points;                             // ascending by id
-  std::vector<KeyFramePose> key_frames;                  // ascending by id, the reference included
+  KeyFrameId reference;                  // the key frame it was made around
+  FrameId reference_frame;               // the frame that the reference was; invalid: one of an earlier session
+  int reference_matches = 0;             // landmarks that the reference sees
+  std::vector<Point> points;             // ascending by id
+  std::vector<KeyFramePose> key_frames;  // ascending by id, the reference included
   std::vector<std::pair<LandmarkId, LandmarkId>> fused;  // recent fusions (from, into), ascending
 
   const Point* find(LandmarkId id) const;
   const KeyFramePose* find(KeyFrameId id) const;
+  /// The key frame whose place and viewing direction are most like the camera's: a metre counts like 40 degrees.
+  KeyFrameId nearest(const SE3& camera_from_world) const;
 };
 
 struct LocalMapOptions {

@@ -4,8 +4,44 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 namespace semvslam {
+
+Result<Map> Map::restore(std::shared_ptr<const ObservationModel> model, MapContent content) {
+  const auto invalid = [](std::string what) { return Error{ErrorCode::kInvalidInput, std::move(what)}; };
+  Map map(std::move(model));
+  for (KeyFrame& key_frame : content.key_frames) {
+    const KeyFrameId id = key_frame.id;
+    if (id >= content.next_key_frame)
+      return invalid(fmt::format("key frame {} has an id that was never given out", id.value));
+    key_frame.landmarks.assign(key_frame.features->size(), LandmarkId());
+    if (!map.key_frames_.emplace(id, std::move(key_frame)).second)
+      return invalid(fmt::format("key frame {} is there twice", id.value));
+  }
+  for (Landmark& landmark : content.landmarks) {
+    const LandmarkId id = landmark.id;
+    if (id >= content.next_landmark || landmark.first_key_frame >= content.next_key_frame)
+      return invalid(fmt::format("landmark {} has an id that was never given out", id.value));
+    const std::vector<Observation> observations = std::exchange(landmark.observations, {});
+    if (!map.landmarks_.emplace(id, std::move(landmark)).second)
+      return invalid(fmt::format("landmark {} is there twice", id.value));
+    for (const Observation& o : observations) {
+      const KeyFrame* seen_in = map.key_frame(o.key_frame);
+      if (seen_in == nullptr || o.feature >= seen_in->features->size())
+        return invalid(fmt::format("landmark {} is seen as feature {} of key frame {}, which is not there", id.value,
+                                   o.feature, o.key_frame.value));
+      if (!map.add_observation(id, o.key_frame, o.feature))
+        return invalid(fmt::format("landmark {} sees feature {} of key frame {}, which is another's, or sees it twice",
+                                   id.value, o.feature, o.key_frame.value));
+    }
+  }
+  map.next_key_frame_ = content.next_key_frame.value;
+  map.next_landmark_ = content.next_landmark.value;
+  map.first_of_session_ = content.next_key_frame;
+  if (Status status = map.check_invariants(); !status) return invalid(status.error().message);
+  return map;
+}
 
 KeyFrameId Map::add_key_frame(FrameId frame, TimeStamp stamp, const SE3& camera_from_world,
                               std::shared_ptr<const FrameFeatures> features) {
@@ -187,6 +223,13 @@ std::vector<LandmarkId> Map::landmark_ids() const {
   for (const auto& [id, landmark] : landmarks_) ids.push_back(id);
   std::sort(ids.begin(), ids.end());
   return ids;
+}
+
+std::vector<Eigen::Vector3d> Map::landmark_positions() const {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(landmarks_.size());
+  for (const LandmarkId id : landmark_ids()) positions.push_back(landmarks_.at(id).position);
+  return positions;
 }
 
 std::vector<LandmarkId> Map::landmarks_of(const std::vector<KeyFrameId>& key_frames) const {

@@ -39,7 +39,7 @@ struct Landmark {
 /// An image that the map keeps.
 struct KeyFrame {
   KeyFrameId id;
-  FrameId frame;
+  FrameId frame;  // of the session that it was made in
   TimeStamp stamp;
   SE3 camera_from_world;
   std::shared_ptr<const FrameFeatures> features;
@@ -52,14 +52,27 @@ struct Covisible {
   int shared = 0;  // landmarks in common
 };
 
+/// All that a map consists of, as plain values; what follows from them is made anew.
+struct MapContent {
+  std::vector<KeyFrame> key_frames;  // each with its grid; `landmarks` is not looked at, it follows from these:
+  std::vector<Landmark> landmarks;
+  KeyFrameId next_key_frame{0};  // ids from here on were never given out
+  LandmarkId next_landmark{0};
+};
+
 /// Key frames and landmarks as values keyed by id; observations indexed from both sides, kept consistent by going
 /// through this class for every change. One writer (the mapping stage); no locks inside. Iteration order never depends
 /// on addresses.
 class Map {
  public:
   explicit Map(std::shared_ptr<const ObservationModel> model) : model_(std::move(model)) {}
+  /// The map of an earlier session. Errors (kInvalidInput): content that contradicts itself, as an id that is there
+  /// twice, or an observation of a key frame or a feature that is not there; what check_invariants() finds.
+  static Result<Map> restore(std::shared_ptr<const ObservationModel> model, MapContent content);
 
   const ObservationModel& model() const { return *model_; }
+  /// @param model with the same pyramid levels: key frames and landmarks refer to them.
+  void set_model(std::shared_ptr<const ObservationModel> model) { model_ = std::move(model); }
 
   KeyFrameId add_key_frame(FrameId frame, TimeStamp stamp, const SE3& camera_from_world,
                            std::shared_ptr<const FrameFeatures> features);
@@ -101,8 +114,14 @@ class Map {
 
   const std::map<KeyFrameId, KeyFrame>& key_frames() const { return key_frames_; }
   std::size_t landmark_count() const { return landmarks_.size(); }
+  /// Key frames from this id on are of this session: the first one's after restore().
+  KeyFrameId first_of_session() const { return first_of_session_; }
+  KeyFrameId next_key_frame() const { return KeyFrameId(next_key_frame_); }
+  LandmarkId next_landmark() const { return LandmarkId(next_landmark_); }
   /// Ids of all landmarks, ascending.
   std::vector<LandmarkId> landmark_ids() const;
+  /// Positions of all landmarks, by id, world frame, metres.
+  std::vector<Eigen::Vector3d> landmark_positions() const;
   /// Ids of the landmarks that any of these key frames sees, ascending.
   std::vector<LandmarkId> landmarks_of(const std::vector<KeyFrameId>& key_frames) const;
 
@@ -122,6 +141,7 @@ class Map {
   std::map<LandmarkId, LandmarkId> fused_;
   std::deque<LandmarkId> fused_order_;  // oldest first
   std::uint32_t next_key_frame_ = 0, next_landmark_ = 0;
+  KeyFrameId first_of_session_{0};
 };
 
 }  // namespace semvslam

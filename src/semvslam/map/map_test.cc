@@ -187,5 +187,35 @@ TEST(ObservationModel, DepthAtEdgesAndOutsideTheRangeIsNotUsed) {
   EXPECT_FLOAT_EQ(f.depth_m[3], 2.f);  // at the border the window is smaller
 }
 
+TEST_F(MapTest, IsRestoredFromItsContentAndRefusesWhatContradictsItself) {
+  const KeyFrameId a = add_key_frame(0), b = add_key_frame(0.1);
+  const LandmarkId l = map.add_landmark({0, 0, 2}, a, 3);
+  map.add_observation(l, b, 1);
+  const auto model = std::make_shared<ObservationModel>(map.model());
+  const MapContent whole{{*map.key_frame(a), *map.key_frame(b)}, {*map.landmark(l)}, KeyFrameId(7), LandmarkId(5)};
+  const auto fault = [&](const auto& change) {
+    MapContent content = whole;
+    change(content);
+    const Result<Map> restored = Map::restore(model, std::move(content));
+    return restored ? "" : restored.error().message;
+  };
+  Result<Map> restored = Map::restore(model, whole);
+  ASSERT_TRUE(restored.ok());
+  EXPECT_EQ(restored->key_frame(b)->landmarks, map.key_frame(b)->landmarks);
+  EXPECT_EQ(restored->landmark(l)->descriptor, map.landmark(l)->descriptor);
+  EXPECT_EQ(restored->first_of_session(), KeyFrameId(7));
+  EXPECT_EQ(restored->next_landmark(), LandmarkId(5));
+  using testing::HasSubstr;
+  EXPECT_THAT(fault([](MapContent& c) { c.next_key_frame = KeyFrameId(1); }), HasSubstr("key frame 1 has an id"));
+  EXPECT_THAT(fault([](MapContent& c) { c.key_frames[1].id = KeyFrameId(0); }),
+              HasSubstr("key frame 0 is there twice"));
+  EXPECT_THAT(fault([](MapContent& c) { c.landmarks.push_back(c.landmarks[0]); }),
+              HasSubstr("landmark 0 is there twice"));
+  EXPECT_THAT(fault([](MapContent& c) { c.landmarks[0].observations[1].feature = 6; }), HasSubstr("is not there"));
+  EXPECT_THAT(fault([](MapContent& c) { c.landmarks[0].observations[1].key_frame = KeyFrameId(0); }),
+              HasSubstr("twice"));
+  EXPECT_THAT(fault([](MapContent& c) { c.landmarks[0].observations.clear(); }), HasSubstr("seen by nobody"));
+}
+
 }  // namespace
 }  // namespace semvslam
