@@ -21,8 +21,10 @@ double lap_ms(Clock::time_point& start) {
 
 }  // namespace
 
-Mapper::Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model)
-    : options_(options), map_(std::move(model)), loop_finder_(options.loop) {}
+Mapper::Mapper(const MappingOptions& options, Map map)
+    : options_(options), map_(std::move(map)), loop_finder_(options.loop) {
+  for (const auto& [id, key_frame] : map_.key_frames()) places_.add(id, landmark_descriptors(key_frame));
+}
 
 std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::stop_token stop) {
   const Clock::time_point begin = Clock::now();

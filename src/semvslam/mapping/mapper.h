@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "semvslam/feature/matching.h"
@@ -15,6 +16,7 @@
 namespace semvslam {
 
 struct MappingOptions {
+  bool frozen = false;                // a saved map is only looked at: nothing in it changes
   double max_landmark_depth_m = 6.0;  // landmarks are made from depth up to here
   double min_found_ratio = 0.1;       // found / visible below which a young landmark goes; blur hides good ones too
   int young_key_frames = 3;           // a landmark must have three observations after so many key frames
@@ -51,7 +53,10 @@ struct MappingTimes {
 /// calls give the same map.
 class Mapper {
  public:
-  Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model);
+  Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model)
+      : Mapper(options, Map(std::move(model))) {}
+  /// Goes on with a map; what an earlier session left in it stands: none of its landmarks is young any more.
+  Mapper(const MappingOptions& options, Map map);
 
   /// @return the snapshot that tracking goes on with.
   std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});

@@ -142,6 +142,21 @@ TEST_F(MapperTest, KeyFramesThatAddNothingGoAndTheirPoseStaysKnown) {
   }
 }
 
+TEST_F(MapperTest, GoesOnWithAMapOfAnEarlierSession) {
+  for (int i = 0; i < 3; ++i)
+    (void)mapper.step(view(i, truth(i), i == 0 ? std::vector<LandmarkId>{} : landmarks_by_point()));
+  const NewKeyFrame next = view(3, truth(3), landmarks_by_point());
+  Mapper later(MappingOptions{}, mapper.map());
+  const std::optional<Relocalisation> found = later.relocalise(*next.features);
+  ASSERT_TRUE(found) << "the index of places is there";
+  EXPECT_LT((found->camera_from_world * truth(3).inverse()).log().norm(), 0.01);
+  const std::size_t landmarks = later.map().landmark_count();
+  (void)later.step(next);
+  EXPECT_TRUE(later.map().check_invariants().ok());
+  EXPECT_EQ(later.map().key_frames().rbegin()->first, mapper.map().next_key_frame());
+  EXPECT_LT(later.map().landmark_count(), landmarks + landmarks / 5) << "what it sees is what is there";
+}
+
 TEST_F(MapperTest, TheSameCallsGiveTheSameMap) {
   Mapper other(MappingOptions{}, model);
   for (int i = 0; i < 4; ++i) {

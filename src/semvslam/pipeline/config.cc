@@ -71,6 +71,7 @@ void describe(ConfigSchema& s, MappingOptions& m) {
         "frames in which the depth looks through a landmark's place: it is gone");
   s.add("mapping.redundant_ratio", &m.redundant_ratio, {0.1, 1},
         "a key frame goes when this share of its landmarks is seen in three others");
+  s.add("mapping.frozen", &m.frozen, "only localise in a saved map: nothing in it changes (run --localise)");
   m.revisit.add_to(s);
   m.loop.add_to(s);
   m.relocalise.add_to(s);

@@ -9,6 +9,9 @@
 #include <variant>
 
 #include "semvslam/base/bounded_queue.h"
+#include "semvslam/data/file_io.h"
+#include "semvslam/map/map_file.h"
+#include "semvslam/pipeline/saved_map.h"
 #include "semvslam/pipeline/segmentation_stage.h"
 
 namespace semvslam {
@@ -17,17 +20,23 @@ namespace semvslam {
 // calling one when deterministic). Between them: a bounded queue of requests one way, a slot with the newest local map
 // the other.
 struct Slam::Impl {
-  Impl(const Config& c, const Camera& camera)
+  Impl(const Config& c, std::shared_ptr<const ObservationModel> m, MapUse use, Map map)
       : config(c),
-        model(std::make_shared<ObservationModel>(camera, c.noise, level_scales(c.orb))),
-        tracker(c.tracking, c.orb, c.dynamic, model),
-        mapper(c.mapping, model),
+        model(std::move(m)),
+        tracker(c.tracking, c.orb, c.dynamic, model, use),
+        loaded_key_frames(map.key_frames().size()),
+        loaded_landmarks(map.landmark_count()),
+        mapper(c.mapping, std::move(map)),
         requests(static_cast<std::size_t>(c.mapping_queue)) {}
 
   void map_key_frame(KeyFrameRequest request);
+  void renew_local_map(const LocalMapRequest& request);
+  void publish(std::shared_ptr<const LocalMap> local);
   void search(const SearchRequest& request);
   void run_mapping();
+  void start_mapping();
   void submit(KeyFrameRequest request);
+  void submit(LocalMapRequest request);
   void submit(SearchRequest request);
   void resume_where_found();
   std::shared_ptr<const LocalMap> newest_map() const {
@@ -43,6 +52,12 @@ struct Slam::Impl {
   std::optional<Segmentation> mask_for(const RgbdFrame& frame);
   void note(const std::string& line);
   TrackResult track(const RgbdFrame& frame, const Segmentation* segmentation);
+  template <typename Visit>
+  void for_key_frames_of_session(const Visit& visit) const {
+    const Map& map = mapper.map();
+    const auto first = map.key_frames().lower_bound(map.first_of_session());
+    std::for_each(first, map.key_frames().end(), [&](const auto& entry) { visit(entry.second); });
+  }
 
   const Config config;
   std::unique_ptr<SegmentationStage> segmentation;  // null: no masks wanted, or none to be had
@@ -50,11 +65,12 @@ struct Slam::Impl {
   Tracker tracker;
   StageTimers timers;
   std::vector<std::shared_ptr<Sink>> sinks;
+  const std::uint64_t loaded_key_frames, loaded_landmarks;
 
   mutable std::mutex map_mutex;  // a query never sees half a mapping step
   Mapper mapper;
 
-  using Request = std::variant<KeyFrameRequest, SearchRequest>;
+  using Request = std::variant<KeyFrameRequest, LocalMapRequest, SearchRequest>;
   BoundedQueue<Request> requests;  // blocks when full, unless realtime: then the tracker asks again later
   mutable std::mutex slot_mutex;
   std::condition_variable published;
@@ -98,6 +114,20 @@ void Slam::Impl::map_key_frame(KeyFrameRequest request) {
     timers["mapping.cull"].add_ms(t.cull_ms);
     timers["mapping"].add_ms(t.total_ms);
   }
+  publish(std::move(local));
+}
+
+void Slam::Impl::renew_local_map(const LocalMapRequest& request) {
+  std::shared_ptr<const LocalMap> local;
+  {
+    std::lock_guard lock(map_mutex);
+    const auto timer = timers["mapping.local_map"].time();
+    local = mapper.local_map(request.reference);
+  }
+  publish(std::move(local));
+}
+
+void Slam::Impl::publish(std::shared_ptr<const LocalMap> local) {
   {
     std::lock_guard lock(slot_mutex);
     newest = std::move(local);
@@ -131,6 +161,8 @@ void Slam::Impl::run_mapping() {
     while (std::optional<Request> request = requests.pop()) {
       if (auto* key_frame = std::get_if<KeyFrameRequest>(&*request))
         map_key_frame(std::move(*key_frame));
+      else if (auto* local_map = std::get_if<LocalMapRequest>(&*request))
+        renew_local_map(*local_map);
       else
         search(std::get<SearchRequest>(*request));
     }
@@ -144,16 +176,26 @@ void Slam::Impl::run_mapping() {
   }
 }
 
+void Slam::Impl::start_mapping() {
+  if (!mapping_thread.joinable()) mapping_thread = std::jthread([this] { run_mapping(); });
+}
+
 void Slam::Impl::submit(KeyFrameRequest request) {
   const bool first = !request.reference.valid();
   if (config.deterministic) {
     map_key_frame(std::move(request));
   } else {
-    if (!mapping_thread.joinable()) mapping_thread = std::jthread([this] { run_mapping(); });
+    start_mapping();
     requests.push(std::move(request));
     // Nothing can be tracked before there is a map, and the first one takes a millisecond.
     if (first) wait_for_first_map();
   }
+}
+
+void Slam::Impl::submit(LocalMapRequest request) {
+  if (config.deterministic) return renew_local_map(request);
+  start_mapping();
+  requests.push(request);
 }
 
 void Slam::Impl::submit(SearchRequest request) {
@@ -166,6 +208,7 @@ void Slam::Impl::submit(SearchRequest request) {
     if (searching) return;
     searching = true;
   }
+  start_mapping();
   Request wrapped = std::move(request);
   if (config.realtime) {
     if (requests.try_push(wrapped)) return;  // found by a later frame
@@ -207,8 +250,27 @@ Slam::~Slam() {
 }
 
 Result<std::unique_ptr<Slam>> Slam::create(const Config& config, const Camera& camera) {
+  return make(config, camera, std::nullopt);
+}
+
+Result<std::unique_ptr<Slam>> Slam::create(const Config& config, const Camera& camera, Map map) {
+  return make(config, camera, std::move(map));
+}
+
+Result<std::unique_ptr<Slam>> Slam::make(const Config& config, const Camera& camera, std::optional<Map> map) {
   if (Status s = camera.check(); !s) return s.error();
   if (Status s = config.check(); !s) return s.error();
+  if (config.mapping.frozen && !map)
+    return Error{ErrorCode::kInvalidInput, "mapping.frozen: there is no saved map to localise in (--map)"};
+  const auto model = std::make_shared<const ObservationModel>(camera, config.noise, level_scales(config.orb));
+  MapUse use = MapUse::kBuild;
+  if (map) {
+    if (Status s = check_saved_map(*map, *model); !s) return s.error();
+    use = config.mapping.frozen ? MapUse::kFollow : MapUse::kExtend;
+    if (use == MapUse::kExtend) map->set_model(model);
+  } else {
+    map.emplace(model);
+  }
   Config used = config;
   std::unique_ptr<SegmentationStage> segmentation;
   std::string notice;
@@ -221,7 +283,7 @@ Result<std::unique_ptr<Slam>> Slam::create(const Config& config, const Camera& c
       used.dynamic.motion = true;
     }
   }
-  std::unique_ptr<Slam> slam(new Slam(std::make_unique<Impl>(used, camera)));
+  std::unique_ptr<Slam> slam(new Slam(std::make_unique<Impl>(used, model, use, std::move(*map))));
   slam->impl_->segmentation = std::move(segmentation);
   if (!notice.empty()) slam->impl_->note(notice);
   return slam;
@@ -320,6 +382,7 @@ TrackResult Slam::Impl::track(const RgbdFrame& frame, const Segmentation* mask) 
   result.tracking_ms = tracked.times.total_ms;
   result.dynamic = tracked.dynamic;
   if (tracked.key_frame) submit(std::move(*tracked.key_frame));
+  if (tracked.local_map) submit(*tracked.local_map);
   if (tracked.state == TrackingState::kTracking && !tracked.relative) {
     if (const auto local = newest_map()) tracked.relative = RelativePose{local->reference, SE3()};
   }
@@ -345,10 +408,22 @@ Status Slam::finish() {
   if (status && !impl_->finished) {
     impl_->finished = true;
     std::lock_guard lock(impl_->map_mutex);
+    const Map& map = impl_->mapper.map();
+    if (map.next_key_frame() == map.first_of_session()) return status;  // nothing is new
     const auto timer = impl_->timers["mapping.final_bundle"].time();
     for (int i = 0; i < impl_->config.mapping.final_bundles; ++i) impl_->mapper.adjust_all();
   }
   return status;
+}
+
+Status Slam::save_map(const std::filesystem::path& path) const {
+  const std::string file = [&] {
+    std::lock_guard lock(impl_->map_mutex);
+    return impl_->mapper.map().key_frames().empty() ? std::string() : format_map(impl_->mapper.map());
+  }();
+  if (file.empty())
+    return Error{ErrorCode::kInvalidInput, fmt::format("{}: not written, the map is empty", path.string())};
+  return write_file_atomically(path, file);
 }
 
 Trajectory Slam::trajectory() const {
@@ -365,25 +440,24 @@ Trajectory Slam::trajectory() const {
 Trajectory Slam::key_frame_trajectory() const {
   std::lock_guard lock(impl_->map_mutex);
   Trajectory trajectory;
-  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames())
+  impl_->for_key_frames_of_session([&](const KeyFrame& key_frame) {
     trajectory.push_back({key_frame.stamp, key_frame.camera_from_world.inverse()});
+  });
   return trajectory;
 }
 
 std::vector<KeyFrameMask> Slam::key_frame_masks() const {
   std::lock_guard lock(impl_->map_mutex);
   std::vector<KeyFrameMask> masks;
-  for (const auto& [id, key_frame] : impl_->mapper.map().key_frames())
+  impl_->for_key_frames_of_session([&](const KeyFrame& key_frame) {
     masks.push_back({key_frame.frame, key_frame.stamp, key_frame.features->moving});
+  });
   return masks;
 }
 
 std::vector<Eigen::Vector3d> Slam::landmark_positions() const {
   std::lock_guard lock(impl_->map_mutex);
-  std::vector<Eigen::Vector3d> positions;
-  for (const LandmarkId id : impl_->mapper.map().landmark_ids())
-    positions.push_back(impl_->mapper.map().landmark(id)->position);
-  return positions;
+  return impl_->mapper.map().landmark_positions();
 }
 
 SlamStatistics Slam::statistics() const {
@@ -394,6 +468,8 @@ SlamStatistics Slam::statistics() const {
   statistics.lost = impl_->lost;
   statistics.key_frames = impl_->mapper.map().key_frames().size();
   statistics.landmarks = impl_->mapper.map().landmark_count();
+  statistics.loaded_key_frames = impl_->loaded_key_frames;
+  statistics.loaded_landmarks = impl_->loaded_landmarks;
   statistics.relocalised = impl_->found_again;
   statistics.revisits = static_cast<std::uint64_t>(impl_->mapper.revisits());
   statistics.loops = static_cast<std::uint64_t>(impl_->mapper.loops());

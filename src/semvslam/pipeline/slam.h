@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "semvslam/geometry/camera.h"
 #include "semvslam/geometry/mask_runs.h"
 #include "semvslam/geometry/se3.h"
+#include "semvslam/map/map.h"
 #include "semvslam/pipeline/config.h"
 #include "semvslam/semantic/segmentation.h"
 #include "semvslam/tracking/messages.h"
@@ -28,8 +30,9 @@ struct TrackResult {
   FrameId frame;
   TimeStamp stamp;
   TrackingState state = TrackingState::kInitializing;
-  SE3 world_from_camera;  // metres; world = camera of the first key frame. While lost: the last known pose
-  int inliers = 0;        // landmarks that agree with the pose
+  /// Metres; world = camera of the first key frame, or the world of the saved map. While lost: the last known pose.
+  SE3 world_from_camera;
+  int inliers = 0;  // landmarks that agree with the pose
   bool is_key_frame = false;
   MaskSource mask_source = MaskSource::kNone;
   double tracking_ms = 0;                        // frame and mask in to pose out
@@ -53,10 +56,11 @@ struct DynamicTotals {
 
 struct SlamStatistics {
   std::uint64_t frames = 0, tracked = 0, lost = 0;
-  std::uint64_t key_frames = 0, landmarks = 0;
-  std::uint64_t relocalised = 0;  // times that a lost camera was found in the map
-  std::uint64_t revisits = 0;     // times that drift since an earlier visit of a place was removed
-  std::uint64_t loops = 0;        // the same, where the place was recognised by what it looks like alone
+  std::uint64_t key_frames = 0, landmarks = 0;                // of the whole map
+  std::uint64_t loaded_key_frames = 0, loaded_landmarks = 0;  // of the saved map that it began with, at the beginning
+  std::uint64_t relocalised = 0;                              // times that a lost camera was found in the map
+  std::uint64_t revisits = 0;  // times that drift since an earlier visit of a place was removed
+  std::uint64_t loops = 0;     // the same, where the place was recognised by what it looks like alone
   DynamicTotals dynamic;
   std::vector<std::string> notices;  // what went wrong without ending the run, each once
   std::vector<StageSummary> stages;
@@ -85,6 +89,10 @@ class Slam {
   /// A network that cannot be had is no Error: motion consistency takes its place, and a notice says so.
   /// @return an Error for a camera or a configuration that fails its check().
   static Result<std::unique_ptr<Slam>> create(const Config& config, const Camera& camera);
+  /// Begins in a saved map (read_map()): frames are lost until one is found in it, then poses are in its world, and it
+  /// grows; with mapping.frozen it stays as it is. Frames, stamps and trajectories are of this session alone.
+  /// @return an Error too for a map without key frames, and where camera or pyramid are not those of the map.
+  static Result<std::unique_ptr<Slam>> create(const Config& config, const Camera& camera, Map map);
   ~Slam();
 
   /// Tracks one frame. Image sizes must be the camera's: anything else is an Error and the frame is not used. Where the
@@ -101,8 +109,13 @@ class Slam {
   /// (mapping.final_bundles); further calls do nothing. @return what went wrong in any stage.
   Status finish();
 
+  /// Writes the map to a file, for another session to begin in; after finish() with everything that was learnt. Errors:
+  /// an empty map; as write_map().
+  Status save_map(const std::filesystem::path& path) const;
+
   /// Poses (world_from_camera) of all tracked frames with everything that mapping has learnt since, by time.
   Trajectory trajectory() const;
+  /// Of the key frames of this session.
   Trajectory key_frame_trajectory() const;
   /// What moved in each key frame, in the order of key_frame_trajectory(): its other pixels are the static scene's.
   std::vector<KeyFrameMask> key_frame_masks() const;
@@ -115,6 +128,7 @@ class Slam {
 
  private:
   struct Impl;
+  static Result<std::unique_ptr<Slam>> make(const Config& config, const Camera& camera, std::optional<Map> map);
   explicit Slam(std::unique_ptr<Impl> impl);
   Result<TrackResult> process_named(const RgbdFrame& frame, std::optional<Segmentation> segmentation);
   std::unique_ptr<Impl> impl_;

@@ -13,6 +13,13 @@ namespace semvslam {
 
 enum class TrackingState { kInitializing, kTracking, kLost };
 
+/// What tracking is to do with the map.
+enum class MapUse {
+  kBuild,   // the first frames begin one
+  kExtend,  // it is there before the first frame, which is looked for in it; then it grows
+  kFollow,  // it is there and stays as it is: only where the camera is in it is of interest
+};
+
 /// How a landmark fared since the last key frame: in how many frames it should have been seen, in how many it was, and
 /// in how many the depth image saw through its place: what carried it has gone.
 struct LandmarkUse {
@@ -29,6 +36,11 @@ struct KeyFrameRequest {
   KeyFrameId reference;               // invalid for the first key frame of a map
   SE3 camera_from_reference;          // stays true when mapping moves the reference meanwhile
   std::vector<LandmarkUse> uses;      // since the previous request
+};
+
+/// What tracking asks of a map that stays as it is: the snapshot around another key frame.
+struct LocalMapRequest {
+  KeyFrameId reference;
 };
 
 /// A frame that got lost, to be looked for in the whole map.

@@ -13,8 +13,9 @@ namespace semvslam::testing {
 /// levels).
 class PlaneWorld {
  public:
-  PlaneWorld() : texture_(kTexturePixels, kTexturePixels, CV_8UC1) {
-    std::mt19937 random(7);
+  /// @param seed of what is on the wall.
+  explicit PlaneWorld(std::uint32_t seed = 7) : texture_(kTexturePixels, kTexturePixels, CV_8UC1) {
+    std::mt19937 random(seed);
     texture_.setTo(128);
     for (int i = 0; i < 6000; ++i) {  // rectangles of many sizes: corners on every level of the pyramid
       const int size = 3 + static_cast<int>(random() % 40);

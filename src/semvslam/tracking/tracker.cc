@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "semvslam/geometry/mask_lookup.h"
 
@@ -22,6 +23,7 @@ constexpr std::size_t kLeastToSearch = 50;   // features by which a lost frame c
 /// as well, on things that look alike, but few of all that should be in view; at right ones the median is a quarter.
 constexpr int kBrieflyLost = 5;
 constexpr double kFoundAgainShare = 0.1;
+constexpr int kMostFramesOffMap = 30;                   // in a row, of a camera that is only localised
 constexpr double kMapJumpM = 0.01, kMapJumpRad = 0.01;  // more than a local bundle adjustment moves the newest frame
 
 }  // namespace
@@ -34,8 +36,9 @@ void Tracker::Candidates::clear() {
 }
 
 Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, const DynamicOptions& dynamic,
-                 std::shared_ptr<const ObservationModel> model)
+                 std::shared_ptr<const ObservationModel> model, MapUse use)
     : options_(options),
+      use_(use),
       model_(std::move(model)),
       extractor_(orb),
       orb_features_(orb.features),
@@ -49,6 +52,8 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, const Segmentation* segmen
   if (local) {
     adopt(std::move(local));
     estimate(frame, may_request, output);
+  } else if (use_ != MapUse::kBuild) {
+    lose(frame.id, output);
   } else if (!waiting_for_map_) {
     initialise(frame, output);
   }
@@ -113,7 +118,9 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
     std::swap(candidates_, frame_matches_);
     output.inliers = track_local_map(frame);
     // Found again after it was lost, a frame must agree with the map: what it was matched against may be long ago.
-    if (output.inliers < options_.min_inliers && has_velocity_) output.inliers = keep_frame_matches();
+    const bool on_map = output.inliers >= options_.min_inliers;
+    if (!on_map && has_velocity_ && may_leave_map()) output.inliers = keep_frame_matches();
+    frames_off_map_ = on_map ? 0 : frames_off_map_ + 1;
     ok = output.inliers >= options_.min_inliers;
   }
   output.times.local_map_ms = ms_since(local_start);
@@ -126,16 +133,23 @@ void Tracker::estimate(const RgbdFrame& frame, bool may_request, Output& output)
         RelativePose{local_->reference, current_.camera_from_world * reference.inverse()};
     has_velocity_ = last_.features != nullptr;
     if (has_velocity_) velocity_ = current_.camera_from_world * last_.camera_from_world.inverse();
-    if (may_request && wants_key_frame(output.inliers, frame.id)) output.key_frame = make_request(frame);
+    if (may_request && use_ == MapUse::kFollow)
+      output.local_map = wants_local_map(frame.id);
+    else if (may_request && wants_key_frame(output.inliers, frame.id))
+      output.key_frame = make_request(frame);
     last_ = std::move(current_);
     lost_frames_ = 0;
   } else {
-    ++lost_frames_;
-    output.state = TrackingState::kLost;
-    if (current_.features->size() >= kLeastToSearch) output.search = SearchRequest{frame.id, current_.features};
-    output.camera_from_world = last_.camera_from_world;
-    has_velocity_ = false;  // the last frame stays what the next one is matched against
+    lose(frame.id, output);
   }
+}
+
+void Tracker::lose(FrameId frame, Output& output) {
+  ++lost_frames_;
+  output.state = TrackingState::kLost;
+  if (current_.features->size() >= kLeastToSearch) output.search = SearchRequest{frame, current_.features};
+  output.camera_from_world = last_.camera_from_world;
+  has_velocity_ = false;  // the last frame stays what the next one is matched against
 }
 
 bool Tracker::resume(const FoundAgain& found) {
@@ -144,7 +158,8 @@ bool Tracker::resume(const FoundAgain& found) {
   last_ = {found.features, found.landmarks, found.relative.camera_from_reference * reference.camera_from_world};
   last_relative_ = found.relative;
   // A key frame is due here, and none is pending: those before were worked off before the search.
-  last_key_frame_ = found.local->reference_frame;
+  last_request_ = found.local->reference_frame;
+  asked_reference_ = found.local->reference;
   filter_.forget_poses();
   return true;
 }
@@ -332,6 +347,8 @@ int Tracker::keep_frame_matches() {
   return static_cast<int>(frame_matches_.features.size());
 }
 
+bool Tracker::may_leave_map() const { return use_ != MapUse::kFollow || frames_off_map_ < kMostFramesOffMap; }
+
 SurfaceCheck Tracker::look_at(const RgbdFrame& frame, const LandmarkView& view) const {
   const Camera& camera = model_->camera();
   if (const cv::Mat& excluded = filter_.excluded(); !excluded.empty()) {
@@ -351,12 +368,12 @@ void Tracker::count_uses(const std::vector<LandmarkId>& visible, const std::vect
 }
 
 bool Tracker::wants_key_frame(int inliers, FrameId frame) const {
-  const int since = static_cast<int>(frame.value - last_key_frame_.value);
+  const int since = frames_since_request(frame);
   const bool almost_lost = inliers < 0.5 * options_.key_frame_ratio * local_->reference_matches;
   if (since < options_.min_frames_between) return almost_lost;
   // While mapping still works on the last request the snapshot cannot know what that one will bring: only a view that
   // is about to get lost is worth another.
-  const bool pending = local_->reference_frame < last_key_frame_;
+  const bool pending = local_->reference_frame != last_request_;
   if (pending) return almost_lost;
   int tracked_close = 0, new_close = 0;
   for (std::size_t i = 0; i < current_.features->size(); ++i) {
@@ -367,6 +384,21 @@ bool Tracker::wants_key_frame(int inliers, FrameId frame) const {
   const bool needs_close = tracked_close < options_.min_tracked_close && new_close > options_.min_new_close;
   const bool weak = inliers < options_.key_frame_ratio * local_->reference_matches || needs_close;
   return since >= options_.max_frames_between || weak;
+}
+
+std::optional<LocalMapRequest> Tracker::wants_local_map(FrameId frame) {
+  uses_.clear();  // nobody will ask how the landmarks fared
+  const bool pending = local_->reference != asked_reference_;
+  if (pending || frames_since_request(frame) < options_.min_frames_between) return std::nullopt;
+  const KeyFrameId nearest = local_->nearest(current_.camera_from_world);
+  if (nearest == local_->reference) return std::nullopt;
+  last_request_ = frame;
+  asked_reference_ = nearest;
+  return LocalMapRequest{nearest};
+}
+
+int Tracker::frames_since_request(FrameId frame) const {
+  return last_request_.valid() ? static_cast<int>(frame.value - last_request_.value) : std::numeric_limits<int>::max();
 }
 
 KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
@@ -385,7 +417,7 @@ KeyFrameRequest Tracker::make_request(const RgbdFrame& frame) {
   std::sort(request.uses.begin(), request.uses.end(),
             [](const auto& a, const auto& b) { return a.landmark < b.landmark; });
   uses_.clear();
-  last_key_frame_ = frame.id;
+  last_request_ = frame.id;
   return request;
 }
 

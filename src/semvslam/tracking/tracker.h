@@ -53,17 +53,19 @@ class Tracker {
     std::optional<RelativePose> relative;      // absent until the first key frame is in the map, and while lost
     int inliers = 0;                           // landmarks that agree with the pose
     std::optional<KeyFrameRequest> key_frame;  // present when this frame should be kept
+    std::optional<LocalMapRequest> local_map;  // MapUse::kFollow: present when the camera has gone on
     std::optional<SearchRequest> search;       // present when it got lost and has features to be found by
     TrackingTimes times;
     std::shared_ptr<const DynamicRecord> dynamic;  // what was left out, and why
   };
 
   Tracker(const TrackingOptions& options, const OrbOptions& orb, const DynamicOptions& dynamic,
-          std::shared_ptr<const ObservationModel> model);
+          std::shared_ptr<const ObservationModel> model, MapUse use = MapUse::kBuild);
 
   /// @param segmentation of this frame or of an earlier one; null = none.
-  /// @param local the newest snapshot of the map; null before the first key frame has been mapped.
-  /// @param may_request whether mapping would take a key frame now.
+  /// @param local the newest snapshot of the map; null before the first key frame has been mapped, or the first frame
+  /// has been found in a map that was there before.
+  /// @param may_request whether mapping would take a request now.
   Output step(const RgbdFrame& frame, const Segmentation* segmentation, std::shared_ptr<const LocalMap> local,
               bool may_request);
 
@@ -94,6 +96,7 @@ class Tracker {
   void share_features(std::size_t used, std::size_t extracted);
   void initialise(const RgbdFrame& frame, Output& output);
   void estimate(const RgbdFrame& frame, bool may_request, Output& output);
+  void lose(FrameId frame, Output& output);
   /// Moves the previous frame with its reference key frame when mapping has adjusted that, and follows fused landmarks.
   void adopt(std::shared_ptr<const LocalMap> local);
   bool track_motion(const SE3& predicted, double radius_factor);
@@ -102,13 +105,20 @@ class Tracker {
   /// Where the local map says nothing (it is hidden, or this part of the scene is not mapped yet) the previous frame
   /// goes on being the reference: its pose stays, and a key frame will be asked for. @return the inliers.
   int keep_frame_matches();
+  /// Whether that may go on: where no key frame will follow, it only drifts away.
+  bool may_leave_map() const;
   SurfaceCheck look_at(const RgbdFrame& frame, const LandmarkView& view) const;
   int estimate_pose(Candidates& candidates, SE3& camera_from_world);
   bool wants_key_frame(int inliers, FrameId frame) const;
+  /// The key frame that is nearest to the camera now, where that is another one than the snapshot's reference.
+  std::optional<LocalMapRequest> wants_local_map(FrameId frame);
+  /// Frames since the last key frame, or since mapping was asked last; very many where there was none.
+  int frames_since_request(FrameId frame) const;
   KeyFrameRequest make_request(const RgbdFrame& frame);
   void count_uses(const std::vector<LandmarkId>& visible, const std::vector<LandmarkId>& found);
 
   TrackingOptions options_;
+  const MapUse use_;
   std::shared_ptr<const ObservationModel> model_;
   OrbExtractor extractor_;
   int orb_features_;  // wanted on the static scene
@@ -117,10 +127,12 @@ class Tracker {
   Tracked current_, last_;
   SE3 velocity_;  // current_from_last
   bool has_velocity_ = false;
-  int lost_frames_ = 0;  // in a row, up to now
+  int lost_frames_ = 0;     // in a row, up to now
+  int frames_off_map_ = 0;  // in a row, in which the local map said nothing
   std::optional<RelativePose> last_relative_;
   bool waiting_for_map_ = false;  // the first request was made
-  FrameId last_key_frame_;
+  FrameId last_request_;          // that a key frame, or a snapshot, was asked for; invalid: none is pending
+  KeyFrameId asked_reference_;    // of the snapshot that was asked for last
   std::unordered_map<LandmarkId, LandmarkUse> uses_;
 
   // Scratch that is kept to save allocations.

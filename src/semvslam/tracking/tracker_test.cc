@@ -132,6 +132,51 @@ TEST_F(TrackerTest, ThePreviousFrameFollowsItsKeyFrameWhenMappingMovesThat) {
   EXPECT_LT((out.camera_from_world * moved_from_old * PlaneWorld::world_from_camera(2)).translation().norm(), 0.002);
 }
 
+TEST_F(TrackerTest, InAMapThatIsThereTheFirstFramesAreLostAndLookedFor) {
+  const auto local = start();
+  Tracker later(TrackingOptions{}, OrbOptions{}, DynamicOptions{}, model, MapUse::kExtend);
+  const Tracker::Output lost = later.step(world.render(1), nullptr, nullptr, true);
+  EXPECT_EQ(lost.state, TrackingState::kLost);
+  EXPECT_FALSE(lost.key_frame.has_value());
+  ASSERT_TRUE(lost.search.has_value());
+  const SE3 truth = PlaneWorld::world_from_camera(1).inverse();
+  const SE3 reference = local->find(local->reference)->camera_from_world;
+  const std::vector<LandmarkId> none(lost.search->features->size());
+  ASSERT_TRUE(later.resume({lost.search->features, none, {local->reference, truth * reference.inverse()}, local}));
+  const Tracker::Output found = later.step(world.render(2), nullptr, local, true);
+  ASSERT_EQ(found.state, TrackingState::kTracking);
+  EXPECT_LT((found.camera_from_world * PlaneWorld::world_from_camera(2)).translation().norm(), 0.002);
+}
+
+TEST_F(TrackerTest, WhereOnlyTheCameraIsOfInterestTheSnapshotIsAskedForThatIsNearest) {
+  auto local = std::make_shared<LocalMap>(*start());
+  // Two more key frames on the way: near where the camera will be after 20 and after 40 frames.
+  for (const int frame : {20, 40})
+    local->key_frames.push_back(
+        {KeyFrameId(static_cast<std::uint32_t>(frame)), PlaneWorld::world_from_camera(frame).inverse(), 0});
+  Tracker later(TrackingOptions{}, OrbOptions{}, DynamicOptions{}, model, MapUse::kFollow);
+  const Tracker::Output lost = later.step(world.render(0), nullptr, nullptr, true);
+  ASSERT_TRUE(later.resume({lost.search->features,
+                            std::vector<LandmarkId>(lost.search->features->size()),
+                            {local->reference, SE3()},
+                            local}));
+  std::vector<std::pair<int, KeyFrameId>> asked;
+  for (int i = 1; i <= 38; ++i) {
+    const Tracker::Output out = later.step(world.render(i), nullptr, local, true);
+    ASSERT_EQ(out.state, TrackingState::kTracking) << "frame " << i;
+    EXPECT_FALSE(out.key_frame.has_value());
+    if (out.local_map) asked.emplace_back(i, out.local_map->reference);
+    if (i == 30) {  // it comes late
+      local = std::make_shared<LocalMap>(*local);
+      local->reference = KeyFrameId(20);
+    }
+  }
+  ASSERT_EQ(asked.size(), 2u) << "not again while one is on its way";
+  EXPECT_EQ(asked[0].second, KeyFrameId(20));
+  EXPECT_NEAR(asked[0].first, 10, 4);
+  EXPECT_EQ(asked[1], std::pair(31, KeyFrameId(40)));
+}
+
 TEST_F(TrackerTest, AKeyFrameIsAskedForWhenTheViewChangesAndOnlyWhenAllowed) {
   const auto local = start();
   bool asked = false;
