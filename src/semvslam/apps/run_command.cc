@@ -19,10 +19,10 @@ constexpr const char* kDefaultMode = "full";
 
 struct RunArguments {
   std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks,
-      dense_map;
+      dense_map, map, save_map;
   std::vector<std::string> assignments;
   std::uint64_t max_frames = 0;
-  bool deterministic = false, realtime = false, quiet = false;
+  bool deterministic = false, realtime = false, quiet = false, localise = false;
 };
 
 /// Applies the file, then --set, then the options that have names of their own: the more special wins.
@@ -36,6 +36,7 @@ Status assign_values(const RunArguments& a, const std::string& file_text, Config
     if (Status status = schema.set("mode=" + a.mode, "--mode"); !status) return status;
   if (a.deterministic) config.deterministic = true;
   if (a.realtime) config.realtime = true;
+  if (a.localise) config.mapping.frozen = true;
   return config.check();
 }
 
@@ -75,6 +76,12 @@ Result<int> run(const RunArguments& a) {
     options.dense_map = a.dense_map;
     if (const Status status = check_cloud_name(options.dense_map); !status) return status.error();
   }
+  options.map = a.map;
+  options.save_map = a.save_map;
+  if (config.mapping.frozen && !(a.dense_map.empty() && a.key_frame_masks.empty()))
+    return Error{ErrorCode::kInvalidInput,
+                 "--dense-map and --key-frame-masks are of a run's key frames: only localising "
+                 "(--localise, mapping.frozen) makes none"};
   if (a.max_frames > 0) options.max_frames = a.max_frames;
   return run_recording(a.sequence, std::move(sequence_options), config, options);
 }
@@ -103,6 +110,12 @@ CommandHandler setup_run(CLI::App& parser) {
   parser.add_option(
       "--dense-map", a->dense_map,
       "file (.ply or .pcd) for a coloured point cloud of the static scene, made of the key frames at the end");
+  parser.add_option("--save-map", a->save_map, "file for the map at the end, for --map and 'semvslam map'");
+  CLI::Option* map = parser.add_option(
+      "--map", a->map,
+      "saved map to begin in: the camera is looked for in it, then the map grows; poses are in its world");
+  parser.add_flag("--localise", a->localise, "only say where the camera is in the saved map: nothing in it changes")
+      ->needs(map);
   parser.add_option("--max-frames", a->max_frames, "stop after this many frames")
       ->check(CLI::Range(1, std::numeric_limits<int>::max()));
   parser.add_flag("--deterministic", a->deterministic, "two runs give the same bytes (slower: one thread)");

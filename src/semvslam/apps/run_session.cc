@@ -17,6 +17,7 @@
 #include "semvslam/data/prefetch.h"
 #include "semvslam/data/text_scan.h"
 #include "semvslam/dynamic/dynamic_overlay.h"
+#include "semvslam/map/map_file.h"
 #include "semvslam/pipeline/segment_ahead.h"
 #include "semvslam/semantic/segmentation_files.h"
 
@@ -258,6 +259,27 @@ Status write_key_frame_masks(const std::filesystem::path& folder, const std::vec
   return Status::success();
 }
 
+/// The system, in the saved map where there is one; what was loaded goes into `record`.
+Result<std::unique_ptr<Slam>> make_slam(const Config& config, const Camera& camera, const RunOptions& options,
+                                        RunRecord& record) {
+  if (options.map.empty()) return Slam::create(config, camera);
+  const Clock::time_point start = Clock::now();
+  Result<Map> map = read_map(options.map);
+  if (!map) return map.error();
+  Result<std::unique_ptr<Slam>> slam = Slam::create(config, camera, std::move(*map));
+  record.map = options.map.string();
+  record.map_load_s = seconds_since(start);
+  return slam;
+}
+
+Error nothing_tracked(std::uint64_t frames, const RunOptions& options) {
+  const std::string log = (options.out / "run.log").string();
+  if (options.map.empty())
+    return {ErrorCode::kInvalidInput, fmt::format("none of the {} frames could be tracked (see {})", frames, log)};
+  return {ErrorCode::kInvalidInput,
+          fmt::format("{}: none of the {} frames was found in this map (see {})", options.map.string(), frames, log)};
+}
+
 void keep_first(Status& first, Status status) {
   if (first && !status) first = std::move(status);
 }
@@ -266,10 +288,12 @@ void keep_first(Status& first, Status status) {
 
 Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& config, const RunOptions& options) {
   const InterruptGuard interrupt;
+  RunRecord record;
+  // First: a map that cannot be used is no reason to remove earlier results.
+  Result<std::unique_ptr<Slam>> slam = make_slam(config, source->camera(), options, record);
+  if (!slam) return slam.error();
   Result<RunOutput> output = RunOutput::create(options.out);
   if (!output) return output.error();
-  Result<std::unique_ptr<Slam>> slam = Slam::create(config, source->camera());
-  if (!slam) return slam.error();
   (*slam)->add_sink(std::make_shared<NoticeSink>(*output));
   if (!options.debug_frames.empty()) {
     if (const Status status = make_folder(options.debug_frames); !status) return status.error();
@@ -277,9 +301,10 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   }
   if (!options.key_frame_masks.empty())
     if (const Status status = make_folder(options.key_frame_masks); !status) return status.error();
-  // Now: after the run is late to find out that there is no place for it.
-  if (options.dense_map.has_parent_path())
-    if (const Status status = make_folder(options.dense_map.parent_path()); !status) return status.error();
+  // Now: after the run is late to find out that there is no place for them.
+  for (const std::filesystem::path& file : {options.dense_map, options.save_map})
+    if (file.has_parent_path())
+      if (const Status status = make_folder(file.parent_path()); !status) return status.error();
   std::shared_ptr<TruthMaskSink> truth;
   if (!options.truth_masks.empty()) {
     Result<std::shared_ptr<TruthMaskSink>> opened =
@@ -289,7 +314,6 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
     (*slam)->add_sink(truth);
   }
   if (const Status status = output->write("config.yaml", config.schema().dump_yaml()); !status) return status.error();
-  RunRecord record;
   record.sequence = source->description();
   record.mode = config.mode;
   record.deterministic = config.deterministic;
@@ -313,13 +337,13 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   outcome.key_frame_masks = (*slam)->key_frame_masks();
   keep_first(outcome.status,
              output->write_results(outcome.trajectory, outcome.key_frames, (*slam)->landmark_positions()));
+  if (!options.save_map.empty() && outcome.statistics.tracked > 0)
+    keep_first(outcome.status, (*slam)->save_map(options.save_map));
   if (!options.key_frame_masks.empty())
     keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, outcome.key_frame_masks));
   keep_first(outcome.status, output->write("stats.json", format_statistics(outcome.record, outcome.statistics)));
   if (outcome.status && outcome.signal == 0 && outcome.statistics.tracked == 0)
-    outcome.status =
-        Error{ErrorCode::kInvalidInput, fmt::format("none of the {} frames could be tracked (see {})",
-                                                    outcome.record.read, (options.out / "run.log").string())};
+    outcome.status = nothing_tracked(outcome.record.read, options);
   output->log("info", outcome.record.end);
   return outcome;
 }

@@ -29,6 +29,8 @@ struct RunOptions {
   std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
   std::filesystem::path truth_masks;      // folder of true masks to judge the policy by; empty = none
   std::filesystem::path dense_map;        // point cloud (.ply, .pcd) to make of the key frames at the end; empty = none
+  std::filesystem::path map;              // saved map to begin in; empty = none
+  std::filesystem::path save_map;         // file for the map at the end; empty = none
   ProcessTime before;                     // spent on something else, as the demo on rendering: not counted to the run
 };
 
@@ -46,7 +48,7 @@ struct RunOutcome {
 /// Runs the system over all frames of `source` and writes the results. A frame that cannot be used is skipped, counted
 /// and logged. An interrupt, a fatal error of the source or of the system ends the run early, with its results written;
 /// so do no errors of the disk: the run goes on and what failed is tried again at its end.
-/// @return an Error when nothing could be started: output folder, camera.
+/// @return an Error when nothing could be started: output folder, camera, saved map.
 Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& config, const RunOptions& options);
 
 /// Runs the system over a recording, prints the summary and, where the recording has a ground truth, the score, which

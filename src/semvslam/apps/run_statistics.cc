@@ -80,6 +80,11 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"cpu_ms_per_frame", per_frame(run.cpu_s, run.read)},
                {"frames_per_s", run.wall_s > 0 ? static_cast<double>(run.read) / run.wall_s : 0.0},
                {"peak_memory_mb", static_cast<double>(run.peak_memory_bytes) / 1e6}};
+  if (!run.map.empty())
+    json["saved_map"] = {{"file", run.map},
+                         {"key_frames", slam.loaded_key_frames},
+                         {"landmarks", slam.loaded_landmarks},
+                         {"load_s", run.map_load_s}};
   if (run.truth)
     json["truth"] = {{"frames", run.truth->frames},
                      {"kept_on_moving", run.truth->kept_on_moving.value()},
@@ -97,6 +102,9 @@ std::string format_summary(const RunRecord& run, const SlamStatistics& slam) {
   if (run.skipped > 0) out += fmt::format(", {} skipped as unusable (see run.log)", run.skipped);
   if (run.dropped > 0) out += fmt::format(", {} dropped to keep pace", run.dropped);
   out += fmt::format("; {} key frames, {} landmarks\n", slam.key_frames, slam.landmarks);
+  if (!run.map.empty())
+    out += fmt::format("{}: began with {} key frames, {} landmarks, loaded in {:.2f} s\n", run.map,
+                       slam.loaded_key_frames, slam.loaded_landmarks, run.map_load_s);
   for (const StageSummary& stage : slam.stages)
     if (stage.name == "tracking" || stage.name == "mapping" || stage.name == "segment")
       out += fmt::format("{:<9} mean {:.2f}  median {:.2f}  p95 {:.2f}  max {:.2f} ms\n", stage.name, stage.mean_ms,
