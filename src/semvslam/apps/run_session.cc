@@ -266,10 +266,9 @@ Result<std::unique_ptr<Slam>> make_slam(const Config& config, const Camera& came
   const Clock::time_point start = Clock::now();
   Result<Map> map = read_map(options.map);
   if (!map) return map.error();
-  Result<std::unique_ptr<Slam>> slam = Slam::create(config, camera, std::move(*map));
   record.map = options.map.string();
   record.map_load_s = seconds_since(start);
-  return slam;
+  return Slam::create(config, camera, std::move(*map));
 }
 
 Error nothing_tracked(std::uint64_t frames, const RunOptions& options) {

@@ -22,7 +22,7 @@ struct RunRecord {
   double cpu_s = 0;           // of the whole process, from there on
   std::int64_t peak_memory_bytes = 0;
   std::string map;                   // file of the saved map that it began in; "" = none
-  double map_load_s = 0;             // reading it, and what is made anew
+  double map_load_s = 0;             // reading it
   StageSummary input;                // waiting for frames
   std::optional<TruthCounts> truth;  // where true masks were given
   std::string end;                   // "complete", "running", or why it ended early

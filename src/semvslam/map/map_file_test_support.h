@@ -3,8 +3,8 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <random>
+#include <vector>
 
-#include "semvslam/feature/orb_extractor.h"
 #include "semvslam/map/map.h"
 #include "semvslam/map/vga_testing.h"
 
@@ -17,7 +17,9 @@ inline Map busy_map(int features = 8) {
   camera.distortion = {0.1, -0.02, 0.001, 0.002, 0.003};
   NoiseModel noise;
   noise.pixel_sigma_px = 0.7;
-  const auto model = std::make_shared<ObservationModel>(camera, noise, level_scales(OrbOptions{}));
+  std::vector<float> scales{1};
+  while (scales.size() < 8) scales.push_back(1.2f * scales.back());
+  const auto model = std::make_shared<ObservationModel>(camera, noise, scales);
   Map map(model);
   std::mt19937_64 random(4);
   std::uniform_real_distribution<float> share(0.1f, 0.9f);

