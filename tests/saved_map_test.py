@@ -116,10 +116,10 @@ class SavedMapTest(ProgramCase):
         self.assertEqual(poses(self.first / "keyframes.txt"), poses(trajectory))
 
     def test_wrong_command_lines(self):
-        self.expect_error(call("map"), 2, "subcommand")
-        self.expect_error(call("map", "inform", self.map), 2)
+        self.expect_error(call("map"), 2, "info or export is required")
+        self.expect_error(call("map", "inform", self.map), 2, "not expected", "inform")
         self.expect_error(call("map", "info"), 2, "FILE")
-        self.expect_error(call("map", "export", self.map), 2)
+        self.expect_error(call("map", "export", self.map), 2, "--out or --trajectory is required")
         self.assertIn("--trajectory", call("map", "export", "--help").stdout)
         self.assertIn("export", call("map", "--help").stdout)
         run = ("run", self.whole, "--out", self.out, "--mode", "orb")

@@ -52,18 +52,22 @@ Result<int> export_map(const MapArguments& a) {
 
 CommandHandler setup_map(CLI::App& parser) {
   auto a = std::make_shared<MapArguments>();
-  parser.require_subcommand(1);
+  parser.require_subcommand(0, 1);
+  parser.callback([&parser] {
+    if (parser.get_subcommands().empty()) throw CLI::RequiredError("map: info or export");
+  });
   CLI::App* info = parser.add_subcommand("info", "what a map file holds: key frames, landmarks, extent, camera, when");
   info->add_option("FILE", a->file, "map that run --save-map wrote")->required();
   info->add_option("--json", a->json, "write it to this file as JSON (- = standard output, alone)");
 
   CLI::App* exported = parser.add_subcommand("export", "landmarks and key-frame poses for other programs");
   exported->add_option("FILE", a->file, "map that run --save-map wrote")->required();
-  CLI::Option_group* targets = exported->add_option_group("to", "at least one of");
-  targets->add_option("--out", a->out, "file for the landmarks: binary PLY, metres");
-  targets->add_option("--trajectory", a->trajectory,
-                      "file for the key frames' poses: 't tx ty tz qx qy qz qw', world from camera, by number");
-  targets->require_option(1, 2);
+  exported->add_option("--out", a->out, "file for the landmarks: binary PLY, metres");
+  exported->add_option("--trajectory", a->trajectory,
+                       "file for the key frames' poses: 't tx ty tz qx qy qz qw', world from camera, by number");
+  exported->callback([a] {
+    if (a->out.empty() && a->trajectory.empty()) throw CLI::RequiredError("map export: --out or --trajectory");
+  });
   return [a, info] { return info->parsed() ? show(*a) : export_map(*a); };
 }
 
