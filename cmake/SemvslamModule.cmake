@@ -16,6 +16,18 @@ if(SEMVSLAM_SANITIZE)
   target_link_options(semvslam_build_flags INTERFACE -fsanitize=${SEMVSLAM_SANITIZE})
 endif()
 
+# semvslam_embed(VARIABLE STRUCT FOLDER NAME...): C++ initialisers STRUCT{"NAME", R"yaml(text of FOLDER/NAME.yaml)yaml"}. Files that
+# are part of the program: no path to get wrong, none to forget when installing.
+function(semvslam_embed variable struct folder)
+  set(all "")
+  foreach(name ${ARGN})
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/${name}.yaml)
+    file(READ ${folder}/${name}.yaml text)
+    string(APPEND all "    ${struct}{\"${name}\", R\"yaml(${text})yaml\"},\n")
+  endforeach()
+  set(${variable} "${all}" PARENT_SCOPE)
+endfunction()
+
 # semvslam_module(NAME SOURCES a.cc... LINKS semvslam::base... [PRIVATE_LINKS ...] [TESTS a_test.cc...] [BENCHES a_bench.cc...])
 function(semvslam_module name)
   cmake_parse_arguments(M "" "" "SOURCES;LINKS;PRIVATE_LINKS;TESTS;BENCHES" ${ARGN})

@@ -47,6 +47,7 @@ CommandHandler setup_eval_seg(CLI::App& parser);
 CommandHandler setup_eval_repair(CLI::App& parser);
 CommandHandler setup_render(CLI::App& parser);
 CommandHandler setup_map(CLI::App& parser);
+CommandHandler setup_bench(CLI::App& parser);
 CommandHandler setup_config(CLI::App& parser);
 CommandHandler setup_eval(CLI::App& parser);
 CommandHandler setup_version(CLI::App& parser);

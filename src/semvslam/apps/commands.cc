@@ -12,6 +12,7 @@ std::span<const Command> commands() {
       Command{"demo", "the main job on a rendered room with people in it", setup_demo},
       Command{"run", "the main job: trajectory, key frames, map and statistics of a recording", setup_run},
       Command{"eval", "measure a trajectory against the ground truth: ATE, RPE, improvement, plot", setup_eval},
+      Command{"bench", "many recordings in many modes: the paper's tables and figures", setup_bench},
       Command{"segment", "find people and things in pictures: overlay, instance image, JSON", setup_segment},
       Command{"eval-seg", "score the segmentation against labelled pictures", setup_eval_seg},
       Command{"eval-repair", "damage masks and measure what their repair is worth", setup_eval_repair},

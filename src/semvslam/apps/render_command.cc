@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <memory>
 #include <string>
 
@@ -16,15 +15,6 @@ struct RenderArguments {
   std::string out, size = "640x480";
   bool jpeg = false, exact = false, quiet = false;
 };
-
-bool parse_size(const std::string& text, int& width, int& height) {
-  const auto x = text.find('x');
-  if (x == std::string::npos) return false;
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), text.data() + x, width);
-  const auto second = std::from_chars(text.data() + x + 1, end, height);
-  return first.ec == std::errc() && first.ptr == text.data() + x && second.ec == std::errc() && second.ptr == end;
-}
 
 Result<int> render(RenderArguments& a) {
   if (!parse_size(a.size, a.scene.width_px, a.scene.height_px))

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <charconv>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -47,6 +48,15 @@ Status render_frames(RenderedScene& scene, const fs::path& folder, bool jpeg, bo
 }
 
 }  // namespace
+
+bool parse_size(const std::string& text, int& width_px, int& height_px) {
+  const auto x = text.find('x');
+  if (x == std::string::npos) return false;
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), text.data() + x, width_px);
+  const auto second = std::from_chars(text.data() + x + 1, end, height_px);
+  return first.ec == std::errc() && first.ptr == text.data() + x && second.ec == std::errc() && second.ptr == end;
+}
 
 Status render_to_folder(const SceneOptions& options, const fs::path& folder, bool jpeg, bool quiet) {
   if (fs::exists(folder))

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "semvslam/base/result.h"
 #include "semvslam/render/scene_source.h"
@@ -11,5 +12,8 @@ namespace semvslam {
 /// roles.json with their meaning. The folder appears only when it is complete. Shows progress on standard error.
 /// Errors: options that break SceneOptions::check(), a folder that exists, disk full, interrupted (kIo).
 Status render_to_folder(const SceneOptions& options, const std::filesystem::path& folder, bool jpeg, bool quiet);
+
+/// Reads "640x480". @return whether it is one; whether pictures may be of that size is for SceneOptions::check().
+bool parse_size(const std::string& text, int& width_px, int& height_px);
 
 }  // namespace semvslam

@@ -1,11 +1,10 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
+#include <functional>
 
-#include "semvslam/base/ranked.h"
 #include "semvslam/eval/evaluation.h"
 #include "semvslam/eval/svg_chart.h"
+#include "semvslam/eval/timed_series.h"
 
 namespace semvslam {
 namespace {
@@ -13,15 +12,6 @@ namespace {
 constexpr const char* kTruthColour = "#555555";
 constexpr const char* kEstimateColour = "#0868ac";
 constexpr const char* kAgainstColour = "#e6740b";
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-/// A longer silence than this is drawn as a gap: ten usual steps, but at least half a second.
-std::int64_t longest_step_ns(const std::vector<TimeStamp>& stamps) {
-  std::vector<std::int64_t> steps;
-  for (std::size_t i = 1; i < stamps.size(); ++i) steps.push_back(stamps[i].ns - stamps[i - 1].ns);
-  if (steps.empty()) return 0;
-  return std::max<std::int64_t>(10 * median(std::span(steps)), 500'000'000);
-}
 
 struct Curve {
   std::string label, colour;
@@ -39,16 +29,9 @@ Curve curve_of(const NamedEvaluation& named, const char* colour) {
 }
 
 /// @param x, y what is drawn of the curve's i-th moment.
-template <typename X, typename Y>
-ChartSeries series_of(const Curve& curve, X x, Y y) {
-  ChartSeries out{curve.label, curve.colour, {}, {}, curve.dashed};
-  const std::int64_t longest_ns = longest_step_ns(curve.stamps);
-  for (std::size_t i = 0; i < curve.stamps.size(); ++i) {
-    if (i > 0 && curve.stamps[i].ns - curve.stamps[i - 1].ns > longest_ns) out.x.push_back(kNan), out.y.push_back(kNan);
-    out.x.push_back(x(i));
-    out.y.push_back(y(i));
-  }
-  return out;
+ChartSeries series_of(const Curve& curve, const std::function<double(std::size_t)>& x,
+                      const std::function<double(std::size_t)>& y) {
+  return timed_series({curve.label, curve.colour, {}, {}, curve.dashed}, curve.stamps, x, y);
 }
 
 }  // namespace

@@ -29,6 +29,11 @@ ErrorStatistics error_statistics(std::span<const double> errors) {
   return out;
 }
 
+Spread spread_of(std::span<const double> values) {
+  const ErrorStatistics s = error_statistics(values);
+  return {s.count, s.median, s.min, s.max};
+}
+
 double improvement_percent(double other, double ours) {
   if (other == 0) return ours == 0 ? 0 : -std::numeric_limits<double>::infinity();
   return (other - ours) / other * 100;

@@ -14,6 +14,14 @@ struct ErrorStatistics {
 
 ErrorStatistics error_statistics(std::span<const double> errors);
 
+/// What several runs gave for one number: its middle and its ends. All zero without a value.
+struct Spread {
+  std::size_t count = 0;
+  double median = 0, min = 0, max = 0;
+};
+
+Spread spread_of(std::span<const double> values);
+
 /// Improvement of `ours` over `other` in percent, (other - ours) / other x 100: 100 = no error left, negative = worse.
 /// 0 when both are 0, minus infinity when only `other` is 0.
 double improvement_percent(double other, double ours);

@@ -36,6 +36,16 @@ TEST(ErrorStatistics, NearlyEqualErrorsKeepTheirSpread) {
   EXPECT_NEAR(error_statistics(errors).sd, 1e-3 * std::sqrt(2.0 / 3), 1e-9);
 }
 
+TEST(Spread, IsTheMiddleAndTheEnds) {
+  const std::vector<double> values = {7, 3, 5, 4};
+  const Spread s = spread_of(values);
+  EXPECT_EQ(s.count, 4u);
+  EXPECT_DOUBLE_EQ(s.median, 4.5);
+  EXPECT_DOUBLE_EQ(s.min, 3);
+  EXPECT_DOUBLE_EQ(s.max, 7);
+  EXPECT_EQ(spread_of({}).count, 0u);
+}
+
 TEST(Improvement, IsRelativeToTheOther) {
   EXPECT_DOUBLE_EQ(improvement_percent(0.4, 0.1), 75);
   EXPECT_DOUBLE_EQ(improvement_percent(0.1, 0.2), -100);

@@ -10,6 +10,7 @@ struct ChartSeries {
   std::string label, colour;  // colour: "#rrggbb"
   std::vector<double> x, y;
   bool dashed = false;
+  double width_px = 1.6;
 };
 
 /// A chart with axes, ticks and grid, placed in an SVG drawing.
@@ -19,6 +20,7 @@ struct Chart {
   bool equal_aspect = false;                                    // one unit is as long on both axes
   bool y_from_zero = false;
   std::vector<ChartSeries> series;
+  bool y_logarithmic = false;  // what is not positive breaks the line
 };
 
 /// What one line means.
@@ -26,12 +28,6 @@ struct LegendEntry {
   std::string label, colour;
   bool dashed = false;
 };
-
-/// Positions for ticks: multiples of 1, 2 or 5 times a power of ten inside [low, high], about `wanted` of them.
-std::vector<double> tick_positions(double low, double high, int wanted);
-
-/// Text for use inside SVG: & < > " escaped, control characters replaced.
-std::string svg_escape(const std::string& text);
 
 /// A complete SVG document with white background, a title, a legend line below it, and the charts.
 std::string draw_svg(double width_px, double height_px, const std::string& title,

@@ -3,23 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <regex>
 
 namespace semvslam {
 namespace {
-
-TEST(TickPositions, AreRoundNumbersInside) {
-  using ::testing::DoubleNear;
-  EXPECT_THAT(tick_positions(0, 10, 5), ::testing::ElementsAre(0, 2, 4, 6, 8, 10));
-  EXPECT_THAT(tick_positions(-0.13, 0.21, 4), ::testing::ElementsAre(DoubleNear(-0.1, 1e-12), DoubleNear(0, 1e-12),
-                                                                     DoubleNear(0.1, 1e-12), DoubleNear(0.2, 1e-12)));
-}
-
-TEST(TickPositions, OfAnEmptyRangeAreNone) {
-  EXPECT_TRUE(tick_positions(1, 1, 5).empty());
-  EXPECT_TRUE(tick_positions(0, INFINITY, 5).empty());
-}
 
 TEST(DrawSvg, EqualAspectKeepsACircleRound) {
   ChartSeries circle{"c", "#123456", {}, {}, false};
@@ -47,6 +36,15 @@ TEST(DrawSvg, OneValueAndNoValueStillGiveADrawing) {
     EXPECT_THAT(svg, ::testing::Not(::testing::HasSubstr("nan")));
     EXPECT_THAT(svg, ::testing::Not(::testing::HasSubstr("inf")));
   }
+}
+
+TEST(DrawSvg, ALogarithmicAxisBreaksTheLineAtWhatIsNotPositive) {
+  const ChartSeries line{"l", "#000000", {0, 1, 2, 3, 4}, {1, 100, 0, 10, 1000}, false};
+  Chart chart{"", "", "", 0, 0, 400, 300, false, true, {line}, true};
+  const std::string svg = draw_svg(400, 300, "", {}, {chart});
+  const std::string path = svg.substr(svg.find("d=\"M"));
+  EXPECT_EQ(std::count(path.begin(), path.end(), 'M'), 2);
+  for (const char* tick : {">1<", ">10<", ">100<", ">1000<"}) EXPECT_THAT(svg, ::testing::HasSubstr(tick));
 }
 
 }  // namespace

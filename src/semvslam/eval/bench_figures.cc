@@ -1,0 +1,229 @@
+#include "semvslam/eval/bench_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "semvslam/eval/bar_chart.h"
+#include "semvslam/eval/published.h"
+#include "semvslam/eval/svg_chart.h"
+#include "semvslam/eval/table.h"
+#include "semvslam/eval/timed_series.h"
+
+namespace semvslam {
+namespace {
+
+constexpr double kToMm = 1e3;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kWidth_px = 960, kPanelWidth_px = 320, kPanelHeight_px = 310, kTimeChartHeight_px = 210;
+constexpr std::size_t kPanelsPerRow = 3;
+constexpr std::size_t kDifferences = 200;  // lines between truth and estimate at most
+constexpr double kLogarithmicFrom = 20;    // ratio of the largest and the least RMSE
+
+/// The two axes along which the true positions extend most, the first letters first.
+std::array<int, 2> widest_plane(const std::vector<Eigen::Vector3d>& positions) {
+  Eigen::Vector3d low = positions.front(), high = low;
+  for (const Eigen::Vector3d& p : positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  int least = 2;
+  for (int axis : {1, 0})
+    if ((high - low)[axis] < (high - low)[least]) least = axis;
+  return {least == 0 ? 1 : 0, least == 2 ? 1 : 2};
+}
+
+/// Lines from the true positions to the estimated ones, evenly spread over the run.
+ChartSeries differences(const AbsoluteError& e, std::array<int, 2> plane) {
+  ChartSeries out{"", kDrawnDifferenceColour, {}, {}, false, 0.8};
+  const std::size_t step = std::max<std::size_t>(1, e.reference.size() / kDifferences);
+  for (std::size_t i = 0; i < e.reference.size(); i += step) {
+    out.x.insert(out.x.end(), {e.reference[i][plane[0]], e.estimate[i][plane[0]], kNan});
+    out.y.insert(out.y.end(), {e.reference[i][plane[1]], e.estimate[i][plane[1]], kNan});
+  }
+  return out;
+}
+
+Chart trajectory_panel(const DrawnRun& run, std::array<int, 2> plane) {
+  const AbsoluteError& e = run.evaluation.absolute;
+  constexpr const char* kAxes[] = {"x (m)", "y (m)", "z (m)"};
+  Chart chart;
+  chart.title = fmt::format("{}: ATE RMSE {} mm", run.mode, three_digits(kToMm * e.statistics_m.rmse));
+  chart.x_label = kAxes[plane[0]];
+  chart.y_label = kAxes[plane[1]];
+  chart.equal_aspect = true;
+  const auto line = [&](const std::vector<Eigen::Vector3d>& positions, ChartSeries style) {
+    return timed_series(
+        std::move(style), e.stamps, [&](std::size_t i) { return positions[i][plane[0]]; },
+        [&](std::size_t i) { return positions[i][plane[1]]; });
+  };
+  chart.series = {differences(e, plane), line(e.reference, {"", kDrawnTruthColour, {}, {}, true}),
+                  line(e.estimate, {"", mode_colour(run.mode), {}, {}, false})};
+  return chart;
+}
+
+/// One kind of error over time.
+struct TimedError {
+  const char *title, *unit;
+  double scale;
+  const ErrorStatistics& (*statistics)(const Evaluation&);
+  const std::vector<double>& (*values)(const Evaluation&);
+  bool of_steps;  // a value per step of the relative error, not per pose
+};
+
+const TimedError kTimedErrors[] = {
+    {"absolute trajectory error", "mm", kToMm,
+     [](const Evaluation& e) -> const ErrorStatistics& { return e.absolute.statistics_m; },
+     [](const Evaluation& e) -> const std::vector<double>& { return e.absolute.errors_m; }, false},
+    {"relative translation, by the start of the step", "mm", kToMm,
+     [](const Evaluation& e) -> const ErrorStatistics& { return e.relative.translation_m; },
+     [](const Evaluation& e) -> const std::vector<double>& { return e.relative.translation_errors_m; }, true},
+    {"relative rotation, by the start of the step", "degrees", 1,
+     [](const Evaluation& e) -> const ErrorStatistics& { return e.relative.rotation_deg; },
+     [](const Evaluation& e) -> const std::vector<double>& { return e.relative.rotation_errors_deg; }, true},
+};
+
+std::vector<TimeStamp> moments(const Evaluation& e, bool of_steps) {
+  if (!of_steps) return e.absolute.stamps;
+  std::vector<TimeStamp> out;
+  for (const RelativeError::Step& step : e.relative.steps) out.push_back(e.absolute.stamps[step.from]);
+  return out;
+}
+
+bool differ_much(const DrawnSequence& drawn, const TimedError& kind) {
+  double low = INFINITY, high = 0;
+  for (const DrawnRun& run : drawn.runs) {
+    const double rmse = kind.statistics(run.evaluation).rmse;
+    low = std::min(low, rmse), high = std::max(high, rmse);
+  }
+  return low > 0 && high > kLogarithmicFrom * low;
+}
+
+Chart time_chart(const DrawnSequence& drawn, const TimedError& kind) {
+  Chart chart;
+  chart.title = kind.title;
+  chart.x_label = "time (s)";
+  chart.y_logarithmic = differ_much(drawn, kind);
+  chart.y_label = kind.unit + std::string(chart.y_logarithmic ? ", logarithmic" : "");
+  chart.y_from_zero = true;
+  std::int64_t start_ns = drawn.runs.front().evaluation.absolute.stamps.front().ns;
+  for (const DrawnRun& run : drawn.runs) start_ns = std::min(start_ns, run.evaluation.absolute.stamps.front().ns);
+  for (const DrawnRun& run : drawn.runs) {
+    const std::vector<TimeStamp> stamps = moments(run.evaluation, kind.of_steps);
+    const std::vector<double>& values = kind.values(run.evaluation);
+    chart.series.push_back(timed_series(
+        {run.mode, mode_colour(run.mode), {}, {}, false, 1.2}, stamps,
+        [&](std::size_t i) { return static_cast<double>(stamps[i].ns - start_ns) * 1e-9; },
+        [&](std::size_t i) { return kind.scale * values[i]; }));
+  }
+  return chart;
+}
+
+void place(Chart& chart, double left_px, double top_px, double width_px, double height_px) {
+  chart.left_px = left_px;
+  chart.top_px = top_px;
+  chart.width_px = width_px;
+  chart.height_px = height_px;
+}
+
+BarChart error_bars(const BenchResults& results, const std::vector<BenchCell>& cells, const char* number,
+                    const char* title, const char* unit, double scale) {
+  BarChart chart{title, unit, results.sequences, {}};
+  for (const std::string& mode : results.modes) {
+    BarSeries series{mode, mode_colour(mode), {}};
+    for (const std::string& sequence : results.sequences) {
+      const BenchCell* cell = find_cell(cells, sequence, mode);
+      const Spread s = cell == nullptr ? Spread{} : cell->over(number);
+      series.values.push_back(s.count == 0 ? kNan : scale * s.median);
+    }
+    chart.series.push_back(std::move(series));
+  }
+  return chart;
+}
+
+/// The published systems beside ours: what a reader knows best, and the paper's own.
+void add_published(BarChart& chart) {
+  constexpr std::pair<const char*, const char*> kShown[] = {
+      {"DS-SLAM", "#c8c8c8"}, {"DynaSLAM", "#a8a8a8"}, {"NGD-SLAM", "#888888"}, {"Sem-VSLAM", "#606060"}};
+  for (const auto& [name, colour] : kShown)
+    for (const PublishedSystem& system : published_systems()) {
+      if (system.system != name) continue;
+      BarSeries series{std::string(name), colour, {}};
+      for (const std::string& sequence : chart.groups) {
+        const auto known = paper_sequence(sequence);
+        const auto error = known ? system.ate_rmse_m(*known) : std::nullopt;
+        series.values.push_back(error ? kToMm * *error : kNan);
+      }
+      chart.series.push_back(std::move(series));
+    }
+}
+
+bool has_bar(const BarChart& chart) {
+  for (const BarSeries& series : chart.series)
+    for (double v : series.values)
+      if (std::isfinite(v)) return true;
+  return false;
+}
+
+}  // namespace
+
+std::string mode_colour(std::string_view mode) {
+  // orb and full as `semvslam eval` draws the other estimate and ours.
+  constexpr std::pair<std::string_view, const char*> kColours[] = {
+      {"orb", "#e6740b"},          {"boxes", "#b59a00"},  {"masks", "#8d5fd3"}, {"masks+repair", "#d0428f"},
+      {"masks+motion", "#1f9e89"}, {"motion", "#4c9a2a"}, {"full", "#0868ac"}};
+  for (const auto& [name, colour] : kColours)
+    if (name == mode) return colour;
+  return "#000000";
+}
+
+std::string draw_trajectories(const DrawnSequence& drawn) {
+  const std::array<int, 2> plane = widest_plane(drawn.runs.front().evaluation.absolute.reference);
+  std::vector<Chart> charts;
+  for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
+    charts.push_back(trajectory_panel(drawn.runs[i], plane));
+    place(charts.back(), kPanelWidth_px * static_cast<double>(i % kPanelsPerRow),
+          kPanelHeight_px * static_cast<double>(i / kPanelsPerRow), kPanelWidth_px, kPanelHeight_px);
+  }
+  const std::size_t rows = (charts.size() + kPanelsPerRow - 1) / kPanelsPerRow;
+  return draw_svg(kPanelWidth_px * static_cast<double>(std::min(charts.size(), kPanelsPerRow)),
+                  kPanelHeight_px * static_cast<double>(rows), "", {}, charts);
+}
+
+std::string draw_errors_over_time(const DrawnSequence& drawn) {
+  std::vector<Chart> charts;
+  for (const TimedError& kind : kTimedErrors) {
+    charts.push_back(time_chart(drawn, kind));
+    place(charts.back(), 0, kTimeChartHeight_px * static_cast<double>(charts.size() - 1), kWidth_px,
+          kTimeChartHeight_px);
+  }
+  return draw_svg(kWidth_px, kTimeChartHeight_px * static_cast<double>(charts.size()), "", {}, charts);
+}
+
+std::vector<std::string> draw_error_bars(const BenchResults& results) {
+  const std::vector<BenchCell> cells = cells_of(results);
+  const std::string step = fmt::format(" over {}, ", results.rpe_delta);
+  constexpr double kHeight_px = 300;
+  std::vector<BarChart> charts;
+  const auto add = [&](const char* number, const std::string& title, const char* unit, double scale) {
+    charts.push_back(error_bars(results, cells, number, title.c_str(), unit, scale));
+  };
+  add("ate_rmse_m", "absolute trajectory error, RMSE", "mm", kToMm);
+  add("ate_sd_m", "absolute trajectory error, SD", "mm", kToMm);
+  add("rpe_translation_rmse_m", "relative translation" + step + "RMSE", "mm", kToMm);
+  add("rpe_translation_sd_m", "relative translation" + step + "SD", "mm", kToMm);
+  add("rpe_rotation_rmse_deg", "relative rotation" + step + "RMSE", "degrees", 1);
+  add("rpe_rotation_sd_deg", "relative rotation" + step + "SD", "degrees", 1);
+  if (std::any_of(results.sequences.begin(), results.sequences.end(), paper_sequence)) {
+    add("ate_rmse_m", "absolute trajectory error, RMSE; grey: published, other machines", "mm", kToMm);
+    add_published(charts.back());
+  }
+  std::vector<std::string> out;
+  for (const BarChart& chart : charts)
+    if (has_bar(chart)) out.push_back(draw_bars(chart, kHeight_px));
+  return out;
+}
+
+}  // namespace semvslam

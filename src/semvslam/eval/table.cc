@@ -1,0 +1,75 @@
+#include "semvslam/eval/table.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "semvslam/eval/markup.h"
+
+namespace semvslam {
+namespace {
+
+/// Markdown lets HTML through, and a bar would end the cell.
+std::string markdown_cell(const std::string& text) {
+  std::string out;
+  for (char c : escape_markup(text)) {
+    if (c == '|') out += '\\';
+    out += c;
+  }
+  return out;
+}
+
+template <typename Format>
+std::string spread_text(const Spread& s, const Format& format) {
+  if (s.count == 0) return "";
+  const std::string middle = format(s.median), low = format(s.min), high = format(s.max);
+  return low == high ? middle : fmt::format("{} ({}-{})", middle, low, high);
+}
+
+}  // namespace
+
+std::string to_markdown(const Table& table) {
+  std::string out = fmt::format("## {}\n\n", markdown_cell(table.title));
+  for (const std::string& name : table.columns) out += "| " + markdown_cell(name) + " ";
+  out += "|\n";
+  for (std::size_t i = 0; i < table.columns.size(); ++i) out += i < table.text_columns ? "|---" : "|---:";
+  out += "|\n";
+  for (const auto& row : table.rows) {
+    for (const std::string& cell : row) out += "| " + markdown_cell(cell) + " ";
+    out += "|\n";
+  }
+  if (!table.note.empty()) out += "\n" + markdown_cell(table.note) + "\n";
+  return out + "\n";
+}
+
+std::string to_html(const Table& table) {
+  std::string out = fmt::format("<h2>{}</h2>\n<div class=\"wide\"><table>\n<tr>", escape_markup(table.title));
+  const auto kind = [&](std::size_t i) { return i < table.text_columns ? " class=\"text\"" : ""; };
+  for (std::size_t i = 0; i < table.columns.size(); ++i)
+    out += fmt::format("<th{}>{}</th>", kind(i), escape_markup(table.columns[i]));
+  out += "</tr>\n";
+  for (const auto& row : table.rows) {
+    out += "<tr>";
+    for (std::size_t i = 0; i < row.size(); ++i) out += fmt::format("<td{}>{}</td>", kind(i), escape_markup(row[i]));
+    out += "</tr>\n";
+  }
+  out += "</table></div>\n";
+  if (!table.note.empty()) out += fmt::format("<p class=\"note\">{}</p>\n", escape_markup(table.note));
+  return out;
+}
+
+std::string three_digits(double value) {
+  if (!std::isfinite(value)) return "-";
+  const double size = std::abs(value);
+  return fmt::format("{:.{}f}", value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2);
+}
+
+std::string format_spread(const Spread& spread, double scale) {
+  return spread_text(spread, [&](double v) { return three_digits(v * scale); });
+}
+
+std::string format_counts(const Spread& spread) {
+  return spread_text(spread, [](double v) { return fmt::format("{}", v); });
+}
+
+}  // namespace semvslam
