@@ -1,9 +1,10 @@
-// Configuration files and --set arguments: loading never crashes, changes nothing on error, and what is dumped loads
-// again.
+// Configuration files, --set arguments and suites: loading never crashes, changes nothing on error, and what is dumped
+// loads again.
 #include <string>
 
 #include "check.h"
 #include "semvslam/base/config_schema.h"
+#include "semvslam/base/yaml_scalars.h"
 
 using namespace semvslam;
 
@@ -25,6 +26,16 @@ struct Options {
     return s;
   }
 };
+
+void check_scalars(const std::string& text) {
+  const auto scalars = yaml_scalars(text, "f");
+  if (!scalars) {
+    FUZZ_CHECK_MESSAGE(scalars.error());
+    return;
+  }
+  FUZZ_CHECK(scalars->size() <= 10'000);
+  for (const YamlScalar& scalar : *scalars) FUZZ_CHECK(!scalar.path.empty() && scalar.where.starts_with("f:"));
+}
 
 }  // namespace
 
@@ -48,5 +59,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_CHECK(copy_schema.load_yaml(after, "g").ok());
     FUZZ_CHECK(copy_schema.dump_yaml() == after);
   }
+  check_scalars(text);
   return 0;
 }

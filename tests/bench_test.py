@@ -146,7 +146,7 @@ class BenchTest(ErrorLineCase):
         rows = self.rows()
         self.assertEqual([True, False], [row["failure"] != "" for row in rows])
         self.assertIn("exit code 3: ", rows[0]["failure"])
-        self.assertIn("1 of 2 runs failed", (self.out / "report.html").read_text())
+        self.assertIn("Failed runs: 1 of 2", (self.out / "report.html").read_text())
         self.assertNotIn("<b>", (self.out / "report.html").read_text())
 
     def test_a_broken_limit_is_named(self):

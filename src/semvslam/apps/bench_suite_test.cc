@@ -161,10 +161,12 @@ TEST(FindRecordings, ExpandsPatternsAndNamesWhatIsMissing) {
 
 TEST(FindRecordings, AFolderIsCalledByItsOwnName) {
   const TemporaryFolder folder;
-  fs::create_directory(folder / "walk");
-  const FoundRecordings found = find_recordings(suite_of_folders({(folder / "walk").string() + "/"}), {});
-  ASSERT_EQ(found.recordings.size(), 1u);
+  for (const char* name : {"walk", "rgbd_dataset_freiburg3_walking_xyz"}) fs::create_directory(folder / name);
+  const FoundRecordings found = find_recordings(
+      suite_of_folders({(folder / "walk").string() + "/", folder / "rgbd_dataset_freiburg3_walking_xyz"}), {});
+  ASSERT_EQ(found.recordings.size(), 2u);
   EXPECT_EQ(found.recordings[0].name, "walk");
+  EXPECT_EQ(found.recordings[1].name, "fr3_walking_xyz");
 }
 
 TEST(PlainName, IsFitForAFolder) {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <cctype>
 #include <set>
 #include <utility>
 
@@ -16,6 +18,11 @@ constexpr std::size_t kMaxScalars = 10'000;  // aliases can make many of a short
 constexpr int kMaxNesting = 16;
 
 Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
+
+bool is_plain_word(const std::string& key) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-'; };
+  return !key.empty() && std::all_of(key.begin(), key.end(), plain);
+}
 
 struct Collector {
   const std::string& origin;
@@ -34,7 +41,8 @@ struct Collector {
 
   Status visit_map(const YAML::Node& map, const std::string& path, int depth) {
     for (const auto& item : map) {
-      if (!item.first.IsScalar()) return invalid(fmt::format("{}: keys must be plain words", where(item.first)));
+      if (!item.first.IsScalar() || !is_plain_word(item.first.Scalar()))
+        return invalid(fmt::format("{}: keys must be plain words", where(item.first)));
       const std::string below = path.empty() ? item.first.Scalar() : path + '.' + item.first.Scalar();
       if (Status status = visit(item.second, below, where(item.first), depth + 1); !status) return status;
     }

@@ -30,6 +30,7 @@ TEST(YamlScalars, RefuseWhatHasNoMeaning) {
   EXPECT_THAT(error_of("a: []\n"), HasSubstr("'a' has no value"));
   EXPECT_THAT(error_of("a: 1\na: 2\n"), HasSubstr("f.yaml:2: 'a' is set twice"));
   EXPECT_THAT(error_of("a: {b: 1}\na.b: 2\n"), HasSubstr("'a.b' is set twice"));
+  EXPECT_THAT(error_of("a: 1\nb=2: 3\n"), HasSubstr("f.yaml:2: keys must be plain words"));
   EXPECT_THAT(error_of("? [a, b]\n: 1\n"), HasSubstr("keys must be plain words"));
   EXPECT_THAT(error_of("a: " + std::string(40, '[') + "1" + std::string(40, ']') + "\n"),
               HasSubstr("nested too deeply"));

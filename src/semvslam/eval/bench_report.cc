@@ -13,6 +13,7 @@ body{font:15px/1.45 "DejaVu Sans",Helvetica,Arial,sans-serif;color:#222;max-widt
 h1{font-size:26px;margin:0 0 12px}h2{font-size:19px;margin:34px 0 8px}h3{font-size:16px;margin:26px 0 4px}
 table{border-collapse:collapse;font-size:13px}td,th{padding:3px 10px;text-align:right;border-bottom:1px solid #e2e2e2;vertical-align:top}
 th{border-bottom:1px solid #777;vertical-align:bottom}.text{text-align:left}.wide{overflow-x:auto}
+td:not(.text){white-space:nowrap}.row{display:flex;flex-wrap:wrap}
 .note{color:#555;font-size:13px;max-width:900px;margin:6px 0}.bad{color:#a31515;font-weight:bold}
 .legend span{margin-right:20px;white-space:nowrap}.legend i{display:inline-block;width:26px;height:0;border-top:3px solid;margin-right:7px;vertical-align:middle}
 .legend i.dashed{border-top-style:dashed}svg{display:block}
@@ -46,9 +47,9 @@ std::string remarks(const BenchResults& results) {
     out += fmt::format("<p class=\"note\">{}</p>\n", escape_markup(remark));
   std::size_t failed = 0;
   for (const BenchRun& run : results.runs) failed += !run.failure.empty();
-  if (failed > 0) out += fmt::format("<p class=\"bad\">{} of {} runs failed.</p>\n", failed, results.runs.size());
+  if (failed > 0) out += fmt::format("<p class=\"bad\">Failed runs: {} of {}</p>\n", failed, results.runs.size());
   if (!results.broken_limits.empty())
-    out += fmt::format("<p class=\"bad\">{} limits are broken.</p>\n", results.broken_limits.size());
+    out += fmt::format("<p class=\"bad\">Broken limits: {}</p>\n", results.broken_limits.size());
   return out;
 }
 
@@ -56,9 +57,9 @@ std::string bar_figures(const BenchResults& results) {
   const std::vector<std::string> figures = draw_error_bars(results);
   if (figures.empty()) return {};
   std::string out = "<h2>Errors by sequence and mode (as the paper's Figures 11 to 13 and 18)</h2>\n";
-  out += legend(results.modes, false);
+  out += legend(results.modes, false) + "<div class=\"row\">\n";
   for (const std::string& svg : figures) out += "<div class=\"wide\">" + svg + "</div>\n";
-  return out;
+  return out + "</div>\n";
 }
 
 std::string sequence_figures(const DrawnSequence& drawn) {

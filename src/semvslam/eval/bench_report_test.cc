@@ -66,9 +66,9 @@ TEST(BenchReport, SaysAtTheTopWhatWentWrong) {
   BenchResults results = small_bench();
   results.broken_limits = {"a", "b"};
   const std::string html = to_html(results, {});
-  EXPECT_THAT(html, HasSubstr("1 of 6 runs failed."));
-  EXPECT_THAT(html, HasSubstr("2 limits are broken."));
-  EXPECT_LT(html.find("runs failed."), html.find("<h2>Summary"));
+  EXPECT_THAT(html, HasSubstr("Failed runs: 1 of 6"));
+  EXPECT_THAT(html, HasSubstr("Broken limits: 2"));
+  EXPECT_LT(html.find("Failed runs:"), html.find("<h2>Summary"));
 }
 
 TEST(BenchReport, WithoutAnyScoreThereAreTablesOnly) {

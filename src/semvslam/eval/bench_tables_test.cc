@@ -79,11 +79,11 @@ TEST(BenchTables, PublishedNumbersStandBesideThePapersRecordingsAndSayWhoseTheyA
   const std::vector<Table> tables = bench_tables(results);
   const Table* across = find_table(tables, "across modes");
   ASSERT_NE(across, nullptr);
-  EXPECT_THAT(across->rows, Contains(ElementsAre("DynaSLAM", HasSubstr("published, other machine"), "16.4", "")));
+  EXPECT_THAT(across->rows, Contains(ElementsAre("DynaSLAM", "published, other machine", "16.4", "")));
   const Table* time = find_table(tables, "Time per frame");
   ASSERT_NE(time, nullptr);
-  EXPECT_THAT(time->rows, Contains(ElementsAre("ORB-SLAM2", HasSubstr("published, other machine"), HasSubstr("i9"),
-                                               "37.51", "", "", "")));
+  EXPECT_THAT(time->rows,
+              Contains(ElementsAre("ORB-SLAM2", "published, other machine", HasSubstr("i9"), "37.51", "", "", "")));
   const Table* relative = find_table(tables, "published, other machine");
   ASSERT_NE(relative, nullptr);
   EXPECT_EQ(relative->rows.size(), 3u);

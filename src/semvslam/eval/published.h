@@ -27,7 +27,7 @@ std::optional<PaperSequence> paper_sequence(std::string_view folder_name);
 
 /// What others published about a system, measured by them on other machines. Values that were not given are absent.
 struct PublishedSystem {
-  std::string_view system, source;
+  std::string_view system;
   std::array<double, kPaperSequences> ate_rmse_values_m;  // 0 = not given
   std::string_view tracking_ms;                           // as printed, may be a range; empty = not given
   std::string_view hardware;                              // that this time was measured on

@@ -12,7 +12,7 @@
 namespace semvslam {
 namespace {
 
-constexpr double kLeftMargin_px = 62, kRightMargin_px = 14, kTopMargin_px = 28, kBottomMargin_px = 46;
+constexpr double kLeftMargin_px = 70, kRightMargin_px = 14, kTopMargin_px = 28, kBottomMargin_px = 46;
 
 std::string number(double v, double step) {
   if (std::abs(v) < 1e-9 * step) v = 0;

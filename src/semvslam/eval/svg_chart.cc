@@ -12,7 +12,7 @@
 namespace semvslam {
 namespace {
 
-constexpr double kLegendLeft_px = 62;
+constexpr double kLegendLeft_px = 70;
 constexpr double kMinPixelStep = 0.4;  // nearer points than this are not drawn: files stay small
 
 AxisRange range_of(const std::vector<ChartSeries>& series, std::vector<double> ChartSeries::*values, bool logarithmic) {

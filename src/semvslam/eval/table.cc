@@ -61,7 +61,12 @@ std::string to_html(const Table& table) {
 std::string three_digits(double value) {
   if (!std::isfinite(value)) return "-";
   const double size = std::abs(value);
-  return fmt::format("{:.{}f}", value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : 2);
+  const int decimals = size >= 99.95                 ? 0
+                       : size >= 9.995               ? 1
+                       : size >= 0.0995 || size == 0 ? 2
+                       : size >= 0.00995             ? 3
+                                                     : 4;
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 std::string format_spread(const Spread& spread, double scale) {

@@ -19,7 +19,8 @@ struct Table {
 std::string to_markdown(const Table& table);
 std::string to_html(const Table& table);
 
-/// A number for people: about three digits, never an exponent ("0.39", "6.2", "417"); "-" for what is not finite.
+/// A number for people: two or three digits, at most four decimals, never an exponent ("0.014", "0.39", "6.20", "417");
+/// "-" for what is not finite.
 std::string three_digits(double value);
 
 /// "6.20 (5.80-6.40)": median and range, times `scale`; the median alone where all are equal as written, nothing

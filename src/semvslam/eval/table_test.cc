@@ -25,6 +25,10 @@ TEST(Table, AsHtmlIsEscaped) {
 
 TEST(ThreeDigits, AreEnoughAndNeverAnExponent) {
   EXPECT_EQ(three_digits(0.3937), "0.39");
+  EXPECT_EQ(three_digits(0), "0.00");
+  EXPECT_EQ(three_digits(0.00012), "0.0001");
+  EXPECT_EQ(three_digits(0.0138), "0.014");
+  EXPECT_EQ(three_digits(0.0999), "0.10");
   EXPECT_EQ(three_digits(6.2), "6.20");
   EXPECT_EQ(three_digits(9.996), "10.0");
   EXPECT_EQ(three_digits(12.34), "12.3");
