@@ -20,8 +20,8 @@ modes: [orb, motion]
 runs: 2
 rpe_delta: 10f
 sequences:
-  - {people: none, motion: xyz, frames: 30, size: 160x120}
-  - {people: sitting, motion: static, frames: 30, size: 160x120, seed: 2}
+  - {people: none, motion: xyz, frames: 30, size: 320x240}
+  - {people: sitting, motion: static, frames: 30, size: 320x240, seed: 2}
 """
 RESULTS = ("results.json", "results.csv", "tables.md", "report.html")
 
@@ -97,9 +97,8 @@ class BenchTest(ErrorLineCase):
         self.assertEqual([], page.open)
         self.assertEqual(6 + 2 * 2, page.tags["svg"])  # bars; trajectories and errors over time of two sequences
         self.assertNotIn("script", page.tags)
-        kept = {"trajectory.txt", "stats.json", "evaluation.json", "config.yaml", "run.log", "output.log", "bench_run.json"}
-        # No evaluation.json: no two poses of so short a recording are a second apart, as `run` wants them.
-        self.assertEqual(kept - {"evaluation.json"}, set(os.listdir(self.out / "runs/none_xyz/orb/1")))
+        self.assertEqual({"trajectory.txt", "stats.json", "evaluation.json", "config.yaml", "run.log", "output.log", "bench_run.json"},
+                         set(os.listdir(self.out / "runs/none_xyz/orb/1")))
 
         before = {file: file.stat().st_mtime_ns for file in self.out.glob("runs/*/*/*/trajectory.txt")}
         again = self.bench(self.suite)

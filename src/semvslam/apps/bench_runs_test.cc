@@ -92,7 +92,7 @@ TEST_F(BenchRunnerTest, ReadsTheNumbersAndScoresTheTrajectory) {
   EXPECT_EQ(outcome.run.truth->static_barred, 0.5);
   ASSERT_TRUE(outcome.run.score) << outcome.no_score;
   EXPECT_LT(outcome.run.score->ate_m.rmse, 1e-6);
-  EXPECT_NEAR(outcome.run.way_m, 0.69, 0.01);
+  EXPECT_NEAR(outcome.run.way_m, 0.707, 0.001);
   EXPECT_TRUE(fs::exists(folder_ / "bench/runs/walk/orb/1/stats.json"));
   EXPECT_FALSE(fs::exists(folder_ / "bench/runs/walk/orb/1/map.ply")) << "too large to be kept for nobody";
 }

@@ -127,8 +127,12 @@ Table across_table(const BenchResults& results, const std::vector<BenchCell>& ce
   table.columns.insert(table.columns.end(), results.sequences.begin(), results.sequences.end());
   for (const std::string& mode : results.modes) {
     std::vector<std::string> row = {"semvslam, " + mode, "this machine"};
-    for (const std::string& sequence : results.sequences) row.push_back(across_cell(find_cell(cells, sequence, mode)));
-    table.rows.push_back(std::move(row));
+    bool any = false;
+    for (const std::string& sequence : results.sequences) {
+      row.push_back(across_cell(find_cell(cells, sequence, mode)));
+      any = any || !row.back().empty();
+    }
+    if (any) table.rows.push_back(std::move(row));
   }
   add_published_errors(results, table);
   return table;

@@ -12,9 +12,13 @@ namespace {
 /// Markdown lets HTML through, and a bar would end the cell.
 std::string markdown_cell(const std::string& text) {
   std::string out;
-  for (char c : escape_markup(text)) {
-    if (c == '|') out += '\\';
-    out += c;
+  for (char c : text) {
+    if (c == '|')
+      out += "\\|";
+    else if (c == '<')
+      out += "&lt;";
+    else
+      out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   }
   return out;
 }

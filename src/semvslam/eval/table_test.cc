@@ -14,7 +14,7 @@ const Table kTable{"A | B", "a note", {"name", "n"}, 1, {{"<b>&|x", "1"}, {"y", 
 
 TEST(Table, AsMarkdown) {
   EXPECT_EQ(to_markdown(kTable),
-            "## A \\| B\n\n| name | n |\n|---|---:|\n| &lt;b&gt;&amp;\\|x | 1 |\n| y | 2 |\n\na note\n\n");
+            "## A \\| B\n\n| name | n |\n|---|---:|\n| &lt;b>&\\|x | 1 |\n| y | 2 |\n\na note\n\n");
 }
 
 TEST(Table, AsHtmlIsEscaped) {
