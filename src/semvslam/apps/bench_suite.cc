@@ -292,7 +292,7 @@ Result<BenchSuite> parse_suite(const std::string& text, const std::string& origi
 
 BenchSuite suite_of_folders(const std::vector<std::string>& folders) {
   BenchSuite suite;
-  suite.name = "bench";
+  suite.name = "recordings";
   suite.modes = {"orb", "full"};
   for (const std::string& folder : folders) suite.entries.push_back({folder, std::nullopt, "", {}, std::nullopt});
   return suite;

@@ -13,7 +13,7 @@ namespace semvslam {
 namespace {
 
 constexpr double kBarWidth_px = 24, kGroupGap_px = 26, kLeastWidth_px = 420, kHeadRoom = 1.15;
-constexpr double kLogarithmicFrom = 20;  // ratio of the largest value and the least
+constexpr double kLogarithmicFrom = 10;  // ratio of the largest value and the least
 constexpr double kDigitWidth_px = 6;     // of the values on the bars, at most
 
 AxisRange axis_of(const BarChart& chart) {

@@ -11,7 +11,7 @@ struct BarSeries {
   std::vector<double> values;  // one per group; NaN = no bar
 };
 
-/// Bars side by side in groups, over a common axis that begins at zero. Where the largest value is more than twenty
+/// Bars side by side in groups, over a common axis that begins at zero. Where the largest value is more than ten
 /// times the least positive one the axis is logarithmic and its label says so: small bars would not be seen otherwise.
 struct BarChart {
   std::string title, y_label;

@@ -20,10 +20,10 @@ namespace {
 
 constexpr double kToMm = 1e3;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kWidth_px = 960, kPanelWidth_px = 320, kPanelHeight_px = 310, kTimeChartHeight_px = 210;
-constexpr std::size_t kPanelsPerRow = 3;
-constexpr std::size_t kDifferences = 200;  // lines between truth and estimate at most
-constexpr double kLogarithmicFrom = 20;    // ratio of the largest and the least RMSE
+constexpr double kWidth_px = 960, kTimeChartHeight_px = 210;
+constexpr std::size_t kFewestColumns = 2, kMostColumns = 3;  // of trajectories
+constexpr std::size_t kDifferences = 200;                    // lines between truth and estimate at most
+constexpr double kLogarithmicFrom = 10;                      // ratio of the largest and the least RMSE
 
 /// The two axes along which the true positions extend most, the first letters first.
 std::array<int, 2> widest_plane(const std::vector<Eigen::Vector3d>& positions) {
@@ -181,15 +181,16 @@ std::string mode_colour(std::string_view mode) {
 
 std::string draw_trajectories(const DrawnSequence& drawn) {
   const std::array<int, 2> plane = widest_plane(drawn.runs.front().evaluation.absolute.reference);
+  const std::size_t columns = std::clamp(drawn.runs.size(), kFewestColumns, kMostColumns);
+  const std::size_t rows = (drawn.runs.size() + columns - 1) / columns;
+  const double width_px = kWidth_px / static_cast<double>(columns), height_px = 0.8 * width_px + 50;
   std::vector<Chart> charts;
   for (std::size_t i = 0; i < drawn.runs.size(); ++i) {
     charts.push_back(trajectory_panel(drawn.runs[i], plane));
-    place(charts.back(), kPanelWidth_px * static_cast<double>(i % kPanelsPerRow),
-          kPanelHeight_px * static_cast<double>(i / kPanelsPerRow), kPanelWidth_px, kPanelHeight_px);
+    place(charts.back(), width_px * static_cast<double>(i % columns), height_px * static_cast<double>(i / columns),
+          width_px, height_px);
   }
-  const std::size_t rows = (charts.size() + kPanelsPerRow - 1) / kPanelsPerRow;
-  return draw_svg(kPanelWidth_px * static_cast<double>(std::min(charts.size(), kPanelsPerRow)),
-                  kPanelHeight_px * static_cast<double>(rows), "", {}, charts);
+  return draw_svg(kWidth_px, height_px * static_cast<double>(rows), "", {}, charts);
 }
 
 std::string draw_errors_over_time(const DrawnSequence& drawn) {

@@ -155,9 +155,12 @@ Table time_table(const BenchResults& results, const std::vector<BenchCell>& cell
   table.text_columns = 3;
   table.columns = {"system",  "source", "hardware", "tracking, mean ms", "tracking, p95 ms", "processor time, ms",
                    "frames/s"};
+  std::string processor;
+  for (const auto& [name, value] : results.facts)
+    if (name == "processor") processor = value;
   for (const std::string& mode : results.modes) {
     if (over_sequences(cells, mode, "tracking_mean_ms").count == 0) continue;
-    std::vector<std::string> row = {"semvslam, " + mode, "this machine", ""};
+    std::vector<std::string> row = {"semvslam, " + mode, "this machine", processor};
     for (const char* name : {"tracking_mean_ms", "tracking_p95_ms", "cpu_ms_per_frame", "frames_per_s"})
       row.push_back(format_spread(over_sequences(cells, mode, name)));
     table.rows.push_back(std::move(row));

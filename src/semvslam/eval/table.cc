@@ -34,15 +34,15 @@ std::string spread_text(const Spread& s, const Format& format) {
 
 std::string to_markdown(const Table& table) {
   std::string out = fmt::format("## {}\n\n", markdown_cell(table.title));
-  for (const std::string& name : table.columns) out += "| " + markdown_cell(name) + " ";
+  for (const std::string& name : table.columns) out += fmt::format("| {} ", markdown_cell(name));
   out += "|\n";
   for (std::size_t i = 0; i < table.columns.size(); ++i) out += i < table.text_columns ? "|---" : "|---:";
   out += "|\n";
   for (const auto& row : table.rows) {
-    for (const std::string& cell : row) out += "| " + markdown_cell(cell) + " ";
+    for (const std::string& cell : row) out += fmt::format("| {} ", markdown_cell(cell));
     out += "|\n";
   }
-  if (!table.note.empty()) out += "\n" + markdown_cell(table.note) + "\n";
+  if (!table.note.empty()) out += fmt::format("\n{}\n", markdown_cell(table.note));
   return out + "\n";
 }
 
