@@ -206,6 +206,13 @@ class SuiteText {
   }();
 };
 
+Status check_once(const std::vector<std::string>& modes) {
+  std::set<std::string> seen;
+  for (const std::string& mode : modes)
+    if (!seen.insert(mode).second) return invalid(fmt::format("mode {} is listed twice", in_quotes(mode)));
+  return Status::success();
+}
+
 /// Folders that a path or pattern means.
 std::vector<fs::path> matches(const fs::path& pattern) {
   std::error_code code;
@@ -258,7 +265,9 @@ Status BenchSuite::check() const {
   if (entries.empty()) return invalid("no 'sequences': nothing to run");
   if (modes.empty()) return invalid("no 'modes': nothing to run");
   std::set<std::string> known(modes.begin(), modes.end());
+  if (Status status = check_once(modes); !status) return status;
   for (const SuiteEntry& entry : entries) {
+    if (Status status = check_once(entry.modes); !status) return status;
     if (!entry.name.empty() && !is_plain_name(entry.name))
       return invalid(fmt::format("{} cannot be a sequence's name: it names a folder", in_quotes(entry.name)));
     known.insert(entry.modes.begin(), entry.modes.end());

@@ -102,6 +102,8 @@ TEST(ParseSuite, ValuesAreChecked) {
   EXPECT_THAT(error_of("sequences: a\nruns: [1, 2]\n"), HasSubstr("'runs.0'"));
   EXPECT_THAT(error_of("sequences: a\nmodes: [orb, fast]\n"), HasSubstr("s.yaml:2: unknown mode 'fast'"));
   EXPECT_THAT(error_of("sequences: [{path: a, modes: fast}]\n"), HasSubstr("unknown mode 'fast'"));
+  EXPECT_THAT(error_of("sequences: a\nmodes: [orb, full, orb]\n"), HasSubstr("mode 'orb' is listed twice"));
+  EXPECT_THAT(error_of("sequences: [{path: a, modes: 'orb,orb'}]\n"), HasSubstr("mode 'orb' is listed twice"));
   EXPECT_THAT(error_of("sequences: a\nbaseline: boxes\n"), HasSubstr("baseline 'boxes' is none of the modes"));
   EXPECT_THAT(error_of("sequences: a\nlimits: {mode: ful}\n"), HasSubstr("unknown mode 'ful'"));
   EXPECT_THAT(error_of("sequences: a\nlimits: {tracked_share: 1.5}\n"), HasSubstr("must be in 0..1"));
