@@ -417,6 +417,8 @@ Status Slam::finish() {
 }
 
 Status Slam::save_map(const std::filesystem::path& path) const {
+  // A step that broke off may have left half a map: no good one is replaced by it.
+  if (Status status = impl_->failure_status(); !status) return status;
   const std::string file = [&] {
     std::lock_guard lock(impl_->map_mutex);
     return impl_->mapper.map().key_frames().empty() ? std::string() : format_map(impl_->mapper.map());

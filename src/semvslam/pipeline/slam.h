@@ -110,7 +110,7 @@ class Slam {
   Status finish();
 
   /// Writes the map to a file, for another session to begin in; after finish() with everything that was learnt. Errors:
-  /// an empty map; as write_map().
+  /// an empty map; mapping that failed; as write_map().
   Status save_map(const std::filesystem::path& path) const;
 
   /// Poses (world_from_camera) of all tracked frames with everything that mapping has learnt since, by time.
