@@ -226,12 +226,12 @@ std::vector<fs::path> matches(const fs::path& pattern) {
   return out;
 }
 
-/// The folder's own name, also of "." and of a path that ends in a slash; those of TUM's downloads as everybody writes
-/// them: fr3_walking_xyz.
+/// The folder's name (of a link its own), also of "." and of a path that ends in a slash; those of TUM's downloads as
+/// everybody writes them: fr3_walking_xyz.
 std::string name_of(const fs::path& folder) {
-  std::error_code code;
-  const fs::path whole = fs::canonical(folder, code);
-  std::string name = (code ? folder : whole).filename().string();
+  fs::path whole = fs::absolute(folder).lexically_normal();
+  if (whole.filename().empty()) whole = whole.parent_path();
+  std::string name = whole.filename().string();
   constexpr std::string_view kTum = "rgbd_dataset_freiburg";
   if (name.starts_with(kTum)) name.replace(0, kTum.size(), "fr");
   return is_plain_name(name) ? name : "sequence";

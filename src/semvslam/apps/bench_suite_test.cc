@@ -163,7 +163,8 @@ TEST(FindRecordings, ExpandsPatternsAndNamesWhatIsMissing) {
 
 TEST(FindRecordings, AFolderIsCalledByItsOwnName) {
   const TemporaryFolder folder;
-  for (const char* name : {"walk", "rgbd_dataset_freiburg3_walking_xyz"}) fs::create_directory(folder / name);
+  fs::create_directory(folder / "walk");
+  fs::create_directory_symlink(folder / "walk", folder / "rgbd_dataset_freiburg3_walking_xyz");
   const FoundRecordings found = find_recordings(
       suite_of_folders({(folder / "walk").string() + "/", folder / "rgbd_dataset_freiburg3_walking_xyz"}), {});
   ASSERT_EQ(found.recordings.size(), 2u);

@@ -12,23 +12,31 @@
 namespace semvslam {
 namespace {
 
-constexpr double kBarWidth_px = 24, kGroupGap_px = 26, kLeastWidth_px = 420, kHeadRoom = 1.15;
-constexpr double kLogarithmicFrom = 10;  // ratio of the largest value and the least
-constexpr double kDigitWidth_px = 6;     // of the values on the bars, at most
+constexpr double kBarWidth_px = 24, kGroupGap_px = 26, kLeastWidth_px = 420;
+constexpr double kHeadRoom = 0.1, kHeadRoomUpwards = 0.22;  // for the value on the largest bar, share of the axis
+constexpr double kLogarithmicFrom = 10;                     // ratio of the largest value and the least
+constexpr double kDigitWidth_px = 6;                        // of the values on the bars, at most
+
+/// Beside each other the values need no more room than the bars; longer ones are written upwards.
+bool is_upwards(const std::string& text) {
+  return static_cast<double>(text.size()) * kDigitWidth_px > kBarWidth_px + 2;
+}
 
 AxisRange axis_of(const BarChart& chart) {
-  double low = INFINITY, high = 0;
+  double low = INFINITY, high = 0, room = kHeadRoom;
   AxisExtent extent(true);
   for (const BarSeries& s : chart.series) {
     extent.include(s.values);
-    for (double v : s.values)
-      if (std::isfinite(v) && v > 0) low = std::min(low, v), high = std::max(high, v);
+    for (double v : s.values) {
+      if (!(std::isfinite(v) && v > 0)) continue;
+      low = std::min(low, v), high = std::max(high, v);
+      if (is_upwards(three_digits(v))) room = kHeadRoomUpwards;
+    }
   }
-  if (high <= kLogarithmicFrom * low) return {0, high > 0 ? kHeadRoom * high : 1.0};
+  if (high <= kLogarithmicFrom * low) return {0, high > 0 ? high / (1 - room) : 1.0};
   AxisRange range = extent.range();
-  // The least bar should be seen, and the value on the largest one should have a place.
-  if (range.low > 0.7 * low) range.low *= 0.5;
-  if (range.high < kHeadRoom * kHeadRoom * high) range.high *= 2;
+  if (range.low > 0.7 * low) range.low *= 0.5;  // the least bar should be seen
+  while (range.share(high) > 1 - room) range.high *= 1.5;
   return range;
 }
 
@@ -37,8 +45,7 @@ std::string draw_bar(const PlotBox& box, double left, double value, const BarSer
   if (!std::isfinite(share)) return {};
   const double top = box.py(value);
   const std::string text = three_digits(value);
-  // Beside each other the values need no more room than the bars, written upwards where they are longer.
-  const bool upwards = static_cast<double>(text.size()) * kDigitWidth_px > kBarWidth_px + 2;
+  const bool upwards = is_upwards(text);
   const double middle = left + kBarWidth_px / 2;
   return fmt::format(
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"/>"

@@ -41,6 +41,17 @@ TEST(DrawBars, ValuesFarApartGetALogarithmicAxisThatShowsThemAll) {
   EXPECT_THAT(svg, HasSubstr("mm, logarithmic"));
 }
 
+TEST(DrawBars, LongValuesStandUprightBelowTheTop) {
+  for (const double least : {0.0341, 0.0011}) {  // on a linear axis and on a logarithmic one
+    const std::string svg =
+        draw_bars({"t", "deg", {"a"}, {{"x", "#111111", {0.0342}}, {"y", "#222222", {least}}}}, 300);
+    std::smatch place;
+    ASSERT_TRUE(std::regex_search(
+        svg, place, std::regex("translate\\([0-9.]+,([0-9.]+)\\) rotate\\(-90\\)\" text-anchor=\"start\">0.034")));
+    EXPECT_GT(std::stod(place[1]), 28 + 5 * 6) << "the box begins at 28 px, five digits are 30 px long";
+  }
+}
+
 TEST(DrawBars, WhatIsMissingHasNoBar) {
   const std::string svg = draw_bars({"t", "mm", {"a", "b"}, {{"orb", "#111111", {NAN, 3}}}}, 300);
   EXPECT_EQ(bar_heights(svg).size(), 1u);

@@ -143,11 +143,12 @@ BarChart error_bars(const BenchResults& results, const std::vector<BenchCell>& c
   return chart;
 }
 
-/// The published systems beside ours: what a reader knows best, and the paper's own.
-void add_published(BarChart& chart) {
-  constexpr std::pair<const char*, const char*> kShown[] = {
-      {"DS-SLAM", "#c8c8c8"}, {"DynaSLAM", "#a8a8a8"}, {"NGD-SLAM", "#888888"}, {"Sem-VSLAM", "#606060"}};
-  for (const auto& [name, colour] : kShown)
+/// What a reader knows best, and the paper's own.
+constexpr DrawnSystem kDrawnSystems[] = {
+    {"DS-SLAM", "#d0d0d0"}, {"DynaSLAM", "#a8a8a8"}, {"NGD-SLAM", "#808080"}, {"Sem-VSLAM", "#505050"}};
+
+void add_published(std::span<const DrawnSystem> systems, BarChart& chart) {
+  for (const auto& [name, colour] : systems)
     for (const PublishedSystem& system : published_systems()) {
       if (system.system != name) continue;
       BarSeries series{std::string(name), colour, {}};
@@ -177,6 +178,11 @@ std::string mode_colour(std::string_view mode) {
   for (const auto& [name, colour] : kColours)
     if (name == mode) return colour;
   return "#000000";
+}
+
+std::span<const DrawnSystem> drawn_systems(const BenchResults& results) {
+  if (std::none_of(results.sequences.begin(), results.sequences.end(), paper_sequence)) return {};
+  return kDrawnSystems;
 }
 
 std::string draw_trajectories(const DrawnSequence& drawn) {
@@ -217,9 +223,9 @@ std::vector<std::string> draw_error_bars(const BenchResults& results) {
   add("rpe_translation_sd_m", "relative translation" + step + "SD", "mm", kToMm);
   add("rpe_rotation_rmse_deg", "relative rotation" + step + "RMSE", "degrees", 1);
   add("rpe_rotation_sd_deg", "relative rotation" + step + "SD", "degrees", 1);
-  if (std::any_of(results.sequences.begin(), results.sequences.end(), paper_sequence)) {
+  if (const auto systems = drawn_systems(results); !systems.empty()) {
     add("ate_rmse_m", "absolute trajectory error, RMSE; grey: published, other machines", "mm", kToMm);
-    add_published(charts.back());
+    add_published(systems, charts.back());
   }
   std::vector<std::string> out;
   for (const BarChart& chart : charts)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,6 +35,14 @@ std::string draw_trajectories(const DrawnSequence& drawn);
 
 /// ATE, relative translation and relative rotation over time, all runs in each; a whole SVG document.
 std::string draw_errors_over_time(const DrawnSequence& drawn);
+
+/// A published system that is drawn beside our modes, and the grey that it has there.
+struct DrawnSystem {
+  std::string_view name;
+  const char* colour;
+};
+/// Those where a recording is one of the paper's; none elsewhere.
+std::span<const DrawnSystem> drawn_systems(const BenchResults& results);
 
 /// Bars over sequences and modes: RMSE and SD of the three errors (as Figures 11 to 13 of the paper), and, where a
 /// recording is one of the paper's, the ATE RMSE beside published ones (Figure 18). Whole SVG documents; none without a

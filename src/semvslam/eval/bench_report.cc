@@ -24,13 +24,10 @@ std::string legend_entry(const std::string& label, const std::string& colour, bo
                      escape_markup(label));
 }
 
-std::string legend(const std::vector<std::string>& modes, bool with_trajectories) {
-  std::string out = "<p class=\"legend\">";
-  if (with_trajectories)
-    out += legend_entry("ground truth", kDrawnTruthColour, true) +
-           legend_entry("difference at equal times", kDrawnDifferenceColour);
+std::string legend_of(const std::vector<std::string>& modes) {
+  std::string out;
   for (const std::string& mode : modes) out += legend_entry(mode, mode_colour(mode));
-  return out + "</p>\n";
+  return out;
 }
 
 std::string facts_table(const BenchResults& results) {
@@ -57,7 +54,9 @@ std::string bar_figures(const BenchResults& results) {
   const std::vector<std::string> figures = draw_error_bars(results);
   if (figures.empty()) return {};
   std::string out = "<h2>Errors by sequence and mode (as the paper's Figures 11 to 13 and 18)</h2>\n";
-  out += legend(results.modes, false) + "<div class=\"row\">\n";
+  out += "<p class=\"legend\">" + legend_of(results.modes);
+  for (const DrawnSystem& system : drawn_systems(results)) out += legend_entry(std::string(system.name), system.colour);
+  out += "</p>\n<div class=\"row\">\n";
   for (const std::string& svg : figures) out += "<div class=\"wide\">" + svg + "</div>\n";
   return out + "</div>\n";
 }
@@ -70,9 +69,12 @@ std::string sequence_figures(const DrawnSequence& drawn) {
     numbers += fmt::format("{}{}: run {}, {:.1f} % of the frames that have a true pose tracked",
                            numbers.empty() ? "" : "; ", run.mode, run.number, 100 * run.evaluation.tracked_share);
   }
+  const std::string legend = legend_entry("ground truth", kDrawnTruthColour, true) +
+                             legend_entry("difference at equal times", kDrawnDifferenceColour) + legend_of(modes);
   return fmt::format(
-      "<h3>{}</h3>\n{}<div class=\"wide\">{}</div>\n<div class=\"wide\">{}</div>\n<p class=\"note\">{}</p>\n",
-      escape_markup(drawn.sequence), legend(modes, true), draw_trajectories(drawn), draw_errors_over_time(drawn),
+      "<h3>{}</h3>\n<p class=\"legend\">{}</p>\n<div class=\"wide\">{}</div>\n<div class=\"wide\">{}</div>\n"
+      "<p class=\"note\">{}</p>\n",
+      escape_markup(drawn.sequence), legend, draw_trajectories(drawn), draw_errors_over_time(drawn),
       escape_markup(numbers));
 }
 
