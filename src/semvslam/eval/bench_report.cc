@@ -9,7 +9,7 @@ namespace semvslam {
 namespace {
 
 constexpr const char* kStyle = R"css(
-body{font:15px/1.45 "DejaVu Sans",Helvetica,Arial,sans-serif;color:#222;max-width:1240px;margin:24px auto;padding:0 20px}
+body{font:15px/1.45 "DejaVu Sans",Helvetica,Arial,sans-serif;color:#222;max-width:1400px;margin:24px auto;padding:0 20px}
 h1{font-size:26px;margin:0 0 12px}h2{font-size:19px;margin:34px 0 8px}h3{font-size:16px;margin:26px 0 4px}
 table{border-collapse:collapse;font-size:13px}td,th{padding:3px 10px;text-align:right;border-bottom:1px solid #e2e2e2;vertical-align:top}
 th{border-bottom:1px solid #777;vertical-align:bottom}.text{text-align:left}.wide{overflow-x:auto}
