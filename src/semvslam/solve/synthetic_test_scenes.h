@@ -56,13 +56,15 @@ inline Bundle make_bundle(const BundleOptions& o) {
   for (int i = 0; i < o.poses; ++i) {
     const double a = 0.6 * (i - 0.5 * o.poses) / o.poses;
     SE3::Tangent wobble;
-    wobble << 0.05 * random3(), 0.03 * random3();
+    wobble.head<3>() = 0.05 * random3();
+    wobble.tail<3>() = 0.03 * random3();
     const SE3 world_from_camera(Eigen::Quaterniond(Eigen::AngleAxisd(-a, Eigen::Vector3d::UnitY())),
                                 Eigen::Vector3d(2 * std::sin(a), 0.1 * unit(rng), 0.5 * (1 - std::cos(a))));
     out.true_poses.push_back(SE3::exp(wobble) * world_from_camera.inverse());
     p.pose_fixed.push_back(i < o.fixed);
     SE3::Tangent error;
-    error << o.pose_error * random3(), o.pose_error * random3();
+    error.head<3>() = o.pose_error * random3();
+    error.tail<3>() = o.pose_error * random3();
     p.poses.push_back(i < o.fixed ? out.true_poses.back() : SE3::exp(error) * out.true_poses.back());
   }
   for (int k = 0; k < o.points; ++k) {
