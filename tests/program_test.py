@@ -239,6 +239,8 @@ class ProgramTest(ProgramCase):
         far = "".join(f"{1000 + i} {i} {i * i} 0 0 0 0 1\n" for i in range(5))
         self.expect_error(call("eval", truth, file("far.txt", far)), 3, "no pose of the estimate")
         self.expect_error(call("eval", truth, truth, "--delta", "1h"), 3, "delta")
+        self.expect_error(call("eval", truth, truth, "--aligned-as", truth), 2, "--aligned-as")
+        self.expect_error(call("eval", truth, truth, "--aligned-as", truth, self.folder / "none.txt"), 3, "none.txt")
         self.expect_error(call("eval", truth, truth, "--plot", self.folder / "no" / "x.svg"), 3, "x.svg")
         unsorted = file("unsorted.txt", "\n".join([lines[0]] + lines[:0:-1]) + "\n")
         done = call("eval", truth, unsorted, "--json", "-")

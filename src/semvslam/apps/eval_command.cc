@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "semvslam/apps/command.h"
 #include "semvslam/data/file_io.h"
@@ -16,6 +17,7 @@ namespace {
 
 struct EvalArguments {
   std::string reference, estimate, against, delta = "1s", json, plot, frames;
+  std::vector<std::string> aligned_as;  // ground truth and estimate of another run in the same world, or nothing
   bool with_scale = false, consecutive = false;
   double max_gap_s = 0.02;
 };
@@ -42,6 +44,19 @@ Result<std::vector<TimeStamp>> read_stamps(const std::string& file) {
   return stamps;
 }
 
+/// How the world of an estimate lies to that of its ground truth.
+Result<Sim3> alignment_of(const std::string& reference_file, const std::string& file,
+                          const EvaluationOptions& options) {
+  const Result<Trajectory> reference = read_trajectory(reference_file);
+  if (!reference) return reference.error();
+  const Result<Trajectory> estimate = read_trajectory(file);
+  if (!estimate) return estimate.error();
+  const Result<AbsoluteError> error =
+      absolute_error(*reference, *estimate, pair_by_time(*reference, *estimate, options.max_gap_s), options.with_scale);
+  if (!error) return about(file + " against " + reference_file, error.error());
+  return error->reference_from_estimate;
+}
+
 Result<int> run_eval(const EvalArguments& arguments) {
   EvaluationReport report;
   report.reference_name = arguments.reference;
@@ -55,6 +70,13 @@ Result<int> run_eval(const EvalArguments& arguments) {
     Result<std::vector<TimeStamp>> stamps = read_stamps(arguments.frames);
     if (!stamps) return stamps.error();
     report.options.frames = std::move(*stamps);
+  }
+
+  if (!arguments.aligned_as.empty()) {
+    const Result<Sim3> alignment = alignment_of(arguments.aligned_as[0], arguments.aligned_as[1], report.options);
+    if (!alignment) return alignment.error();
+    report.options.reference_from_estimate = *alignment;
+    report.aligned_as = arguments.aligned_as[1];
   }
 
   const Result<Trajectory> reference = read_trajectory(arguments.reference);
@@ -88,6 +110,12 @@ CommandHandler setup_eval(CLI::App& parser) {
   parser.add_flag("--consecutive", a->consecutive,
                   "relative error over steps that follow each other, not overlapping ones");
   parser.add_flag("--scale", a->with_scale, "align with scale (Sim3), for estimates that have none");
+  parser
+      .add_option("--aligned-as", a->aligned_as,
+                  "ground truth and estimate of another run in the same world, as of the one that made a saved map: "
+                  "align as that one is")
+      ->type_name("GROUND_TRUTH ESTIMATE")
+      ->expected(2);
   parser.add_option("--max-gap", a->max_gap_s, "largest time between two poses of one moment, seconds")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 10.0));

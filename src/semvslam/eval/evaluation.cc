@@ -29,7 +29,9 @@ Result<Evaluation> evaluate(const Trajectory& reference, const Trajectory& estim
   out.tracked_share =
       share_tracked(options.frames.empty() ? stamps_of(reference) : options.frames, estimate, options.max_gap_s);
 
-  Result<AbsoluteError> absolute = absolute_error(reference, estimate, pairs, options.with_scale);
+  Result<AbsoluteError> absolute = options.reference_from_estimate
+                                       ? absolute_error(reference, estimate, pairs, *options.reference_from_estimate)
+                                       : absolute_error(reference, estimate, pairs, options.with_scale);
   if (!absolute) return absolute.error();
   out.absolute = std::move(*absolute);
   RelativeErrorOptions relative_options = options.relative;

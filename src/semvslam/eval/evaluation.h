@@ -13,6 +13,8 @@ namespace semvslam {
 struct EvaluationOptions {
   double max_gap_s = 0.02;  // between two poses of one moment
   bool with_scale = false;  // align with Sim(3): for estimates without metric scale
+  /// How the estimate's world lies to the truth's, where another run in the same world has shown it; else the best.
+  std::optional<Sim3> reference_from_estimate;
   RelativeErrorOptions relative;
   /// The moments that had to be tracked (the recording's frames), sorted; where empty, the ground truth's stamps. A
   /// ground truth that is longer than the recording needs them for an honest share.
@@ -40,11 +42,14 @@ struct NamedEvaluation {
 /// What reports are made of: one estimate, and another one that it is compared with where there is one.
 struct EvaluationReport {
   std::string reference_name;
+  std::string aligned_as;  // the estimate that the alignment was taken from; empty = each has its own
   EvaluationOptions options;
   NamedEvaluation estimate;
   std::optional<NamedEvaluation> against;
 };
 
+/// How the trajectories were aligned, for people: "aligned by SE(3)".
+std::string alignment_text(const EvaluationReport& report);
 /// A table for people, several lines.
 std::string format_text(const EvaluationReport& report);
 /// All numbers with full precision, for programs.

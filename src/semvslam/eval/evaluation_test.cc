@@ -49,6 +49,23 @@ TEST(Evaluate, SharesAreOfTheGroundTruthOrOfTheFramesGiven) {
   EXPECT_DOUBLE_EQ(evaluate(truth, estimate, options)->tracked_share, 1.0);
 }
 
+TEST(Evaluate, AnAlignmentThatIsGivenKeepsWhatTheBestOneWouldTakeAway) {
+  const Trajectory truth = circle(100);
+  const SE3 estimate_from_truth(Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ())), {3, -1, 2});
+  const auto moved = [&](const SE3& by) {
+    Trajectory out = truth;
+    for (StampedPose& pose : out) pose.world_from_camera = by * pose.world_from_camera;
+    return out;
+  };
+  EvaluationOptions options;
+  options.reference_from_estimate = evaluate(truth, moved(estimate_from_truth), {})->absolute.reference_from_estimate;
+  const SE3 off(Eigen::Quaterniond::Identity(), {0, 0, 0.02});
+  const Trajectory localised = moved(estimate_from_truth * off);
+  EXPECT_NEAR(evaluate(truth, localised, {})->absolute.statistics_m.rmse, 0, 1e-9);
+  EXPECT_NEAR(evaluate(truth, localised, options)->absolute.statistics_m.rmse, 0.02, 1e-9);
+  EXPECT_NEAR(evaluate(truth, localised, options)->absolute.statistics_m.min, 0.02, 1e-9);
+}
+
 EvaluationReport report_of(const Trajectory& truth, const Trajectory& estimate, const Trajectory& against) {
   EvaluationReport report;
   report.reference_name = "truth.txt";

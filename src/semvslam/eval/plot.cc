@@ -58,9 +58,7 @@ std::string format_svg(const EvaluationReport& report) {
       error.series.push_back(series_of(curve, seconds, [&](std::size_t i) { return curve.errors_m[i]; }));
     legend.push_back({curve.label, curve.colour, curve.dashed});
   }
-  return draw_svg(960, top + 655,
-                  report.options.with_scale ? "Trajectories aligned by Sim(3)" : "Trajectories aligned by SE(3)",
-                  legend, {above, side, error});
+  return draw_svg(960, top + 655, "Trajectories " + alignment_text(report), legend, {above, side, error});
 }
 
 }  // namespace semvslam

@@ -65,10 +65,14 @@ Json gains(const ErrorStatistics& other, const ErrorStatistics& ours) {
 
 }  // namespace
 
+std::string alignment_text(const EvaluationReport& report) {
+  if (!report.aligned_as.empty()) return "aligned as " + report.aligned_as;
+  return report.options.with_scale ? "aligned by Sim(3)" : "aligned by SE(3)";
+}
+
 std::string format_text(const EvaluationReport& report) {
-  std::string out =
-      fmt::format("ground truth {} ({} poses), aligned by {}\n", report.reference_name,
-                  report.estimate.evaluation.reference_poses, report.options.with_scale ? "Sim(3)" : "SE(3)");
+  std::string out = fmt::format("ground truth {} ({} poses), {}\n", report.reference_name,
+                                report.estimate.evaluation.reference_poses, alignment_text(report));
   out += fmt::format("{:<22}{:>11}{:>11}{:>11}{:>11}{:>11}{:>11}\n", "", "RMSE", "mean", "median", "SD", "min", "max");
   out += block(report.estimate, report);
   if (!report.against) return out;
@@ -90,6 +94,7 @@ std::string format_json(const EvaluationReport& report) {
       {"rpe_delta", report.options.relative.delta.text()},
       {"rpe_overlapping_steps", report.options.relative.overlapping},
       {"estimate", to_json(report.estimate)}};
+  if (!report.aligned_as.empty()) json["aligned_as"] = report.aligned_as;
   if (report.against) {
     const Evaluation& ours = report.estimate.evaluation;
     const Evaluation& other = report.against->evaluation;

@@ -48,18 +48,25 @@ Result<AbsoluteError> absolute_error(const Trajectory& reference, const Trajecto
                                      const std::vector<PosePair>& pairs, bool with_scale) {
   if (pairs.size() < 3)
     return invalid(fmt::format("only {} poses could be paired by time; an alignment needs 3", pairs.size()));
+  std::vector<Eigen::Vector3d> from, to;
+  for (const PosePair& pair : pairs) {
+    from.push_back(estimate[pair.estimate].world_from_camera.translation());
+    to.push_back(reference[pair.reference].world_from_camera.translation());
+  }
+  const Result<Alignment> alignment = align_points(to, from, with_scale);
+  if (!alignment) return alignment.error();
+  return absolute_error(reference, estimate, pairs, alignment->a_from_b);
+}
+
+AbsoluteError absolute_error(const Trajectory& reference, const Trajectory& estimate,
+                             const std::vector<PosePair>& pairs, const Sim3& reference_from_estimate) {
   AbsoluteError out;
+  out.reference_from_estimate = reference_from_estimate;
   for (const PosePair& pair : pairs) {
     out.stamps.push_back(estimate[pair.estimate].stamp);
     out.reference.push_back(reference[pair.reference].world_from_camera.translation());
-    out.estimate.push_back(estimate[pair.estimate].world_from_camera.translation());
-  }
-  const Result<Alignment> alignment = align_points(out.reference, out.estimate, with_scale);
-  if (!alignment) return alignment.error();
-  out.reference_from_estimate = alignment->a_from_b;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    out.estimate[i] = out.reference_from_estimate * out.estimate[i];
-    out.errors_m.push_back((out.reference[i] - out.estimate[i]).norm());
+    out.estimate.push_back(reference_from_estimate * estimate[pair.estimate].world_from_camera.translation());
+    out.errors_m.push_back((out.reference.back() - out.estimate.back()).norm());
   }
   out.statistics_m = error_statistics(out.errors_m);
   return out;

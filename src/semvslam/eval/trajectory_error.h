@@ -29,6 +29,10 @@ struct AbsoluteError {
 /// Errors: fewer than 3 pairs, or positions on one line (no unique alignment).
 Result<AbsoluteError> absolute_error(const Trajectory& reference, const Trajectory& estimate,
                                      const std::vector<PosePair>& pairs, bool with_scale);
+/// The same where the two worlds are known to lie like this to each other: what the best alignment would take away of
+/// the error stays in it.
+AbsoluteError absolute_error(const Trajectory& reference, const Trajectory& estimate,
+                             const std::vector<PosePair>& pairs, const Sim3& reference_from_estimate);
 
 /// The step over which a relative error is taken.
 struct Delta {
