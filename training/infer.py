@@ -24,9 +24,14 @@ PROPOSALS_PER_LEVEL, PROPOSALS = 300, 100
 RPN_NMS, BOX_NMS, MOST = 0.7, 0.5, 50
 SEMANTIC_SHARE, MASK_THRESHOLD = 0.35, 0.44     # of persons' masks
 REFINE_SIDE, REFINE_MARGIN = 56, 1 / 14         # cells of a refined mask; what it sees around a box, as a share of its sides
+REFINE_STEP, REFINE_LEAST = 8, 24               # in narrower inputs these cells stay as large: fewer of them, multiples of so many
 LEAST_PROBABILITY = 1e-3                        # of a mask's cell, as the refinement sees it
 SURE = 0.45                                     # least score beside a camera: even odds, and a mask as sure as good ones are (0.9)
 SURE_OF_STILLS = 0.55                           # of single pictures: nothing comes after it that would see a false person
+
+
+def refine_side(width, trained_width):
+    return min(REFINE_SIDE, max(REFINE_LEAST, math.ceil(REFINE_SIDE * width / trained_width / REFINE_STEP) * REFINE_STEP))
 
 
 def size_of(text):
@@ -161,9 +166,9 @@ def bent(p, threshold):
     return (np.log(p / (1 - p)) - math.log(threshold / (1 - threshold))).astype(np.float32)
 
 
-def on_region(prob, box, region, semantic=None, share=0.0):
-    """The mask at the cells' centres of the region, [REFINE_SIDE, REFINE_SIDE]. Everything in pixels of the network's input."""
-    at = lambda low, high: low + (high - low) / REFINE_SIDE * (np.arange(REFINE_SIDE, dtype=np.float32) + 0.5)
+def on_region(prob, box, region, semantic=None, share=0.0, side=REFINE_SIDE):
+    """The mask at the cells' centres of the region, [side, side]. Everything in pixels of the network's input."""
+    at = lambda low, high: low + (high - low) / side * (np.arange(side, dtype=np.float32) + 0.5)
     return read_mask(prob, box, at(region[0], region[2]), at(region[1], region[3]), semantic, share=share)
 
 
@@ -198,13 +203,17 @@ class OpenVino:
         if precision:
             options["INFERENCE_PRECISION_HINT"] = precision
         models = [core.read_model(os.path.join(folder, f)) for f in (trunk, box, mask, refine) if f]
+        self.refines, self.side = refine is not None, REFINE_SIDE
         if size:
+            trained_width = models[0].input(0).partial_shape[3].get_length()
             models[0].reshape([1, 3, *size])
+            self.side = refine_side(size[1], trained_width)
+        if self.refines and self.side != REFINE_SIDE:
+            models[3].reshape({i: [-1, self.side, self.side, *list(i.partial_shape)[3:]] for i in models[3].inputs})
         if box_energy < 1:
             shorten_largest_product(models[1], box_energy)
         self.graphs = [core.compile_model(m, "CPU", options).create_infer_request() for m in models]
         self.size = tuple(self.graphs[0].get_compiled_model().input(0).shape)[2:]
-        self.refines = refine is not None
 
     def run(self, graph, *inputs):
         r = self.graphs[graph]
@@ -258,19 +267,19 @@ class Segmenter:
         return b[nms(b, s, RPN_NMS, PROPOSALS)]
 
     def refine_inputs(self, t, masks, boxes, classes, regions):
-        """The mask head's masks [n, 2, 28, 28] over the boxes -> logits [n, REFINE_SIDE, REFINE_SIDE] over the regions, certainties [n]."""
+        """The mask head's masks [n, 2, 28, 28] over the boxes -> logits [n, side, side] over the regions, certainties [n]."""
         semantic = np.ascontiguousarray(t["semantic"][0, :, :, 0])
         logits, certain = [], []
         for m, b, c, r in zip(masks, boxes, classes, regions):
             threshold = self.threshold if c == 0 else 0.5
-            p = on_region(m[0], b, r, semantic, self.share) if c == 0 else on_region(m[1], b, r)
+            p = on_region(m[0], b, r, semantic, self.share, self.g.side) if c == 0 else on_region(m[1], b, r, side=self.g.side)
             logits.append(bent(p, threshold))
             certain.append(mean_inside(p, threshold))
         return np.stack(logits), certain
 
     def refined(self, t, masks, boxes, classes, regions):
-        """Masks [n, REFINE_SIDE, REFINE_SIDE] over the regions, certainties [n]."""
-        features = roi_align([t["fine"][0]], regions, REFINE_SIDE, (), (self.fine_stride,))
+        """Masks [n, side, side] over the regions, certainties [n]."""
+        features = roi_align([t["fine"][0]], regions, self.g.side, (), (self.fine_stride,))
         logits, certain = self.refine_inputs(t, masks, boxes, classes, regions)
         return self.g.refine(logits, features)["masks"], certain
 

@@ -10,7 +10,11 @@
 namespace semvslam {
 
 MapReport report_of(const Map& map, const std::string& file, std::uintmax_t bytes) {
-  MapReport report{.file = file, .bytes = bytes, .version = kMapFileVersion, .camera = map.model().camera()};
+  MapReport report;
+  report.file = file;
+  report.bytes = bytes;
+  report.version = kMapFileVersion;
+  report.camera = map.model().camera();
   report.key_frames = map.key_frames().size();
   report.landmarks = map.landmark_count();
   report.levels = map.model().levels();

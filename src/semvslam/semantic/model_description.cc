@@ -37,6 +37,7 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.trunk_int8 = j.value("trunk_int8", "");
   m.refine = j.value("refine", "");
   m.input = {integer_at<int>(j.at("input"), "width"), integer_at<int>(j.at("input"), "height")};
+  m.trained_width_px = m.input.width;
   m.pad = integer_at<int>(j.at("input"), "pad");
   m.classes = j.at("classes").get<std::vector<std::string>>();
   m.strides = fixed<ModelDescription::kLevels>(integers_at<int>(j, "strides"), "strides");
@@ -50,8 +51,8 @@ void fill(ModelDescription& m, const nlohmann::json& j) {
   m.semantic_share = j.at("semantic_share").get<float>();
   m.mask_threshold = j.at("mask_threshold").get<float>();
   if (const auto cost = j.find("gflops"); cost != j.end())
-    m.gflops = {cost->at("trunk").get<double>(), cost->at("box").get<double>(),
-                cost->at("mask").get<double>() + cost->value("refine", 0.)};
+    m.gflops = {cost->at("trunk").get<double>(), cost->at("box").get<double>(), cost->at("mask").get<double>(),
+                cost->value("refine", 0.)};
   check(m.input.width >= 32 && m.input.height >= 32 && m.input.width <= 4096 && m.input.height <= 4096,
         "'input' is no usable size");
   check(!m.classes.empty(), "'classes' is empty");
@@ -102,6 +103,11 @@ void ModelDescription::set_input_width(int width_px) {
   input.width = rounded(width_px);
   input.height = rounded(static_cast<double>(input.width) * before.height / before.width);
   gflops.trunk *= static_cast<double>(input.area()) / before.area();
+  constexpr int kSideStep = 8, kLeastSide = 24;
+  const int side_before = refine_side;
+  const double side = static_cast<double>(kRefineSide) * input.width / trained_width_px;
+  refine_side = std::clamp(static_cast<int>(std::ceil(side / kSideStep)) * kSideStep, kLeastSide, kRefineSide);
+  gflops.refine_region *= static_cast<double>(refine_side * refine_side) / (side_before * side_before);
 }
 
 Result<ModelDescription> ModelDescription::read(const std::filesystem::path& folder) {

@@ -35,8 +35,8 @@ struct BoxHeadOutput {
 
 /// Where the refinement reads one region from; memory of the graphs. Both are empty where the model has no refinement.
 struct RefineInput {
-  std::span<float> logits;    // of the mask, kRefineSide x kRefineSide, positive = inside
-  std::span<float> features;  // kRefineSide x kRefineSide x fine_channels
+  std::span<float> logits;    // of the mask, refine_side x refine_side, positive = inside
+  std::span<float> features;  // refine_side x refine_side x fine_channels
 };
 
 /// The graphs that make one object's mask. One thread at a time, whatever the others do.
@@ -47,7 +47,7 @@ class MaskGraphs {
   virtual std::span<float> mask_input() = 0;
   /// @return kMaskChannels x kMaskSide x kMaskSide probabilities.
   virtual Result<std::span<const float>> mask_head() = 0;
-  /// The refinement of one region's mask. @return kRefineSide x kRefineSide probabilities, inside where >= 0.5.
+  /// The refinement of one region's mask. @return refine_side x refine_side probabilities, inside where >= 0.5.
   virtual RefineInput refine_input() = 0;
   virtual Result<std::span<const float>> refine_head() = 0;
 };
@@ -58,7 +58,7 @@ class NetworkGraphs {
   // Regions of one call of the box head (below 96 OpenVINO takes a kernel that makes 64 slower than 100); cells along
   // an edge.
   static constexpr int kBoxBatch = 100, kBoxCells = 7;
-  static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2, kRefineSide = 56;
+  static constexpr int kMaskCells = 14, kMaskSide = 28, kMaskChannels = 2;
 
   virtual ~NetworkGraphs() = default;
   /// @param image CV_8UC3 BGR of the model's input size.

@@ -142,16 +142,16 @@ Result<NetworkSegmenter::RefinedMask> NetworkSegmenter::refine(MaskGraphs& graph
                                                                const SemanticHint* hint) const {
   const DetectionBox region = mask.box.grown(model_.refine_margin);
   const RefineInput input = graphs.refine_input();
-  sample_mask(mask, region, NetworkGraphs::kRefineSide, hint, input.logits.data());
+  sample_mask(mask, region, model_.refine_side, hint, input.logits.data());
   // Of the mask before: a refined one is surer of itself, but ranks objects no better.
   const float certainty = mean_inside(input.logits, threshold);
   if (!(score * certainty >= limits_.score)) return RefinedMask{};
   bend_logits(input.logits, threshold);
-  roi_align(trunk.fine, model_.fine_channels, region, NetworkGraphs::kRefineSide, input.features.data());
+  roi_align(trunk.fine, model_.fine_channels, region, model_.refine_side, input.features.data());
   const Result<std::span<const float>> refined = graphs.refine_head();
   if (!refined) return refined.error();
   if (!finite(*refined)) return not_finite("refined masks");
-  return RefinedMask{{refined->data(), NetworkGraphs::kRefineSide, region}, certainty};
+  return RefinedMask{{refined->data(), model_.refine_side, region}, certainty};
 }
 
 Result<PastedMask> NetworkSegmenter::paste(MaskGraphs& graphs, const TrunkOutput& trunk, const Object& object,

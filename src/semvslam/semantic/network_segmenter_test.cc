@@ -45,7 +45,7 @@ class FakeGraphs final : public NetworkGraphs, public MaskGraphs {
     const int rows = model.input.height / model.fine_stride, columns = model.input.width / model.fine_stride;
     fine_.assign(static_cast<std::size_t>(rows) * columns * model.fine_channels, 0.5f);
     out_.fine = {fine_.data(), rows, columns, model.fine_stride};
-    logits_in_.resize(static_cast<std::size_t>(kRefineSide) * kRefineSide);
+    logits_in_.resize(static_cast<std::size_t>(model.refine_side) * model.refine_side);
     fine_in_.resize(logits_in_.size() * model.fine_channels);
     refined_.assign(logits_in_.size(), 1.f);
   }
@@ -129,7 +129,7 @@ TEST(NetworkSegmenter, ARefinementSeesMoreThanTheBoxAndItsMaskIsWhatIsPasted) {
   f.graphs->level_[2].objectness[5] = 9.f;  // a 64 px square around (48, 48): with its margin from 0 to 96
   f.graphs->probabilities_[1] = 0.8f;
   f.graphs->semantic_.assign(f.graphs->semantic_.size(), 0.f);
-  constexpr int kSide = NetworkGraphs::kRefineSide;
+  constexpr int kSide = ModelDescription::kRefineSide;
   for (int y = 0; y < kSide; ++y)
     for (int x = kSide / 2; x < kSide; ++x) f.graphs->refined_[static_cast<std::size_t>(y * kSide + x)] = 0.f;
   const Result<Segmentation> s = f.segmenter->segment(request(cv::Mat(192, 256, CV_8UC3, cv::Scalar::all(0))));
@@ -222,6 +222,7 @@ TEST(ModelDescription, AnotherWidthKeepsTheShapeOfTheInput) {
   model->set_input_width(512);
   EXPECT_EQ(model->input, cv::Size(512, 384));
   EXPECT_NEAR(model->gflops.trunk, 0.64 * gflops, 1e-9);
+  EXPECT_EQ(model->refine_side, 48);
   model->set_input_width(570);  // sides are multiples of 32
   EXPECT_EQ(model->input, cv::Size(576, 448));
   model->set_input_width(1);

@@ -21,8 +21,9 @@ class OpenCvGraphs final : public NetworkGraphs, public MaskGraphs {
     mask_in_ = cv::Mat::zeros(4, mask_shape, CV_32F);
     if (!model.refine.empty()) {
       refine_ = read(folder / model.refine);
-      const int logits_shape[] = {1, kRefineSide, kRefineSide};
-      const int features_shape[] = {1, kRefineSide, kRefineSide, model.fine_channels};
+      const int logits_shape[] = {1, ModelDescription::kRefineSide, ModelDescription::kRefineSide};
+      const int features_shape[] = {1, ModelDescription::kRefineSide, ModelDescription::kRefineSide,
+                                    model.fine_channels};
       logits_in_ = cv::Mat::zeros(3, logits_shape, CV_32F);
       fine_in_ = cv::Mat::zeros(4, features_shape, CV_32F);
     }
@@ -100,7 +101,8 @@ class OpenCvGraphs final : public NetworkGraphs, public MaskGraphs {
       refine_.setInput(logits_in_, "logits");
       refine_.setInput(fine_in_, "features");
       refined_ = refine_.forward("masks");
-      return numbers(refined_, static_cast<std::size_t>(kRefineSide) * kRefineSide, "masks");
+      return numbers(refined_, static_cast<std::size_t>(ModelDescription::kRefineSide) * ModelDescription::kRefineSide,
+                     "masks");
     });
   }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <map>
 #include <openvino/op/constant.hpp>
 #include <openvino/op/matmul.hpp>
@@ -125,13 +126,14 @@ void shorten_largest_product(const std::shared_ptr<ov::Model>& m, double energy)
   ov::replace_node(largest, times(times(largest->input_value(0), factors->wide), factors->high));
 }
 
+/// @param change made to the graph before it is compiled; null = none.
 ov::InferRequest load_graph(const std::filesystem::path& file, const Inputs& inputs, const ov::AnyMap& options,
-                            double energy = 1) {
+                            const std::function<void(const std::shared_ptr<ov::Model>&)>& change = nullptr) {
   try {
     const std::shared_ptr<ov::Model> m = read(file);
     check_inputs(m, inputs);
     m->reshape(inputs);
-    if (energy < 1) shorten_largest_product(m, energy);
+    if (change) change(m);
     return compile(m, options).create_infer_request();
   } catch (const std::exception& e) {
     throw WrongTensor(fmt::format("{}: {}", file.string(), e.what()));
@@ -171,11 +173,13 @@ class OpenVinoMaskGraphs final : public MaskGraphs {
     mask_ = load_graph(folder / model.mask, {{"rois", {1, kCells, kCells, model.channels}}}, options);
     masks_ = output(mask_, model.mask, "masks", {1, NetworkGraphs::kMaskChannels, kSide, kSide});
     if (model.refine.empty()) return;
-    constexpr std::size_t kRefined = NetworkGraphs::kRefineSide;
-    refine_ = load_graph(
-        folder / model.refine,
-        {{"logits", {1, kRefined, kRefined}}, {"features", {1, kRefined, kRefined, model.fine_channels}}}, options);
-    refined_ = output(refine_, model.refine, "masks", {1, kRefined, kRefined});
+    const auto refined_inputs = [&](int side) {
+      return Inputs{{"logits", {1, side, side}}, {"features", {1, side, side, model.fine_channels}}};
+    };
+    refine_ = load_graph(folder / model.refine, refined_inputs(ModelDescription::kRefineSide), options,
+                         [&](const auto& m) { m->reshape(refined_inputs(model.refine_side)); });
+    const auto side = static_cast<std::size_t>(model.refine_side);
+    refined_ = output(refine_, model.refine, "masks", {1, side, side});
     refine_in_ = {input(refine_, "logits"), input(refine_, "features")};
   }
 
@@ -221,7 +225,9 @@ class OpenVinoGraphs final : public NetworkGraphs {
     options[ov::inference_num_threads.name()] = 1;
     const ov::Dimension c = model.channels;
     box_ = load_graph(folder / model.box, {{"rois", {kBoxBatch, kBoxCells, kBoxCells, model.channels}}}, options,
-                      wanted.box_energy);
+                      [&](const auto& m) {
+                        if (wanted.box_energy < 1) shorten_largest_product(m, wanted.box_energy);
+                      });
     probabilities_ = output(box_, model.box, "probabilities", {kBoxBatch, model.classes.size() + 1});
     box_deltas_ = output(box_, model.box, "deltas", {kBoxBatch, 4});
     for (int lane = 0; lane < std::min(wanted.threads, kMaskLanes); ++lane) {
