@@ -24,10 +24,9 @@ int main(int argc, char** argv) {
   if (!slam) return fail(slam.error());
 
   for (;;) {
-    const auto frame = (*source)->next();
-    if (!frame && (*source)->fatal()) return fail(frame.error());
-    if (!frame) continue;  // a frame that cannot be read
-    if (!*frame) break;    // the end
+    const auto frame = semvslam::next_readable(**source);
+    if (!frame) return fail(frame.error());
+    if (!*frame) break;  // the end
     const auto result = (*slam)->process(**frame);
     if (!result) return fail(result.error());
     if (result->state != semvslam::TrackingState::kTracking) continue;  // not found in the map, yet

@@ -35,8 +35,7 @@ struct ChosenSuite {
 
 int list_suites() {
   for (const BuiltInSuite& built_in : built_in_suites()) {
-    const Result<BenchSuite> suite =
-        parse_suite(std::string(built_in.text), std::string(built_in.name), std::string(built_in.name));
+    const Result<BenchSuite> suite = built_in.read();
     if (!suite) continue;  // a test reads them all
     fmt::print("{:<10} {}; {} sequences, modes {}, {} {}\n", suite->name, suite->about, suite->entries.size(),
                fmt::join(suite->modes, ","), suite->runs, suite->runs == 1 ? "run" : "runs");
@@ -45,11 +44,10 @@ int list_suites() {
 }
 
 Error unknown_suite(const std::string& target) {
-  std::string known;
-  for (const BuiltInSuite& suite : built_in_suites())
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", suite.name);
+  std::vector<std::string_view> known;
+  for (const BuiltInSuite& suite : built_in_suites()) known.push_back(suite.name);
   return {ErrorCode::kNotFound,
-          fmt::format("{} is no suite ({}), no suite file and no folder", in_quotes(target), known)};
+          fmt::format("{} is no suite ({}), no suite file and no folder", in_quotes(target), fmt::join(known, ", "))};
 }
 
 /// Folders of recordings as they were named; every one of them must be there.
@@ -68,7 +66,7 @@ Result<ChosenSuite> choose_suite(const BenchArguments& a) {
   const std::string& target = a.targets.front();
   for (const BuiltInSuite& built_in : built_in_suites())
     if (built_in.name == target) {
-      Result<BenchSuite> suite = parse_suite(std::string(built_in.text), "suite " + target, target);
+      Result<BenchSuite> suite = built_in.read();
       if (!suite) return suite.error();
       return ChosenSuite{std::move(*suite), a.data};
     }

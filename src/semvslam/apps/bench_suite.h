@@ -56,6 +56,9 @@ void choose_baseline(BenchSuite& suite);
 /// A suite file that is part of the program (presets/bench in the sources).
 struct BuiltInSuite {
   std::string_view name, text;
+  Result<BenchSuite> read() const {
+    return parse_suite(std::string(text), "suite " + std::string(name), std::string(name));
+  }
 };
 std::span<const BuiltInSuite> built_in_suites();
 

@@ -130,7 +130,7 @@ TEST(ParseSuite, EntriesAreFoldersOrScenes) {
 TEST(BuiltInSuites, AllLoad) {
   std::vector<std::string> names;
   for (const BuiltInSuite& built_in : built_in_suites()) {
-    const auto suite = parse_suite(std::string(built_in.text), std::string(built_in.name), std::string(built_in.name));
+    const auto suite = built_in.read();
     ASSERT_TRUE(suite) << suite.error().message;
     EXPECT_FALSE(suite->about.empty()) << suite->name;
     EXPECT_EQ(suite->baseline, "orb") << suite->name;

@@ -17,10 +17,10 @@ Result<DenseMapSummary> make_dense_map(const std::filesystem::path& sequence, Se
   if (!source) return source.error();
   VoxelMap map((*source)->camera(), options);
   for (std::size_t k = 0; k < key_frames.size();) {
-    const Result<std::optional<RgbdFrame>> next = (*source)->next();
-    if (!next && (*source)->fatal()) return next.error();
-    if (next && !*next) break;
-    if (!next) continue;  // skipped by the run as well
+    const Result<std::optional<RgbdFrame>> next =
+        next_readable(**source);  // the others were skipped by the run as well
+    if (!next) return next.error();
+    if (!*next) break;
     const RgbdFrame& frame = **next;
     while (k < key_frames.size() && key_frames[k].stamp < frame.stamp) ++k;
     if (k == key_frames.size() || key_frames[k].stamp != frame.stamp) continue;

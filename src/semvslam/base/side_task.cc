@@ -51,4 +51,11 @@ void SideTask::run() {
   }
 }
 
+SideTaskGuard::~SideTaskGuard() {
+  try {
+    task_.wait();
+  } catch (...) {  // the scope is being left for another reason
+  }
+}
+
 }  // namespace semvslam

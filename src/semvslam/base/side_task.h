@@ -34,4 +34,17 @@ class SideTask {
   std::thread thread_;
 };
 
+/// Holds the end of a scope until a task is done, also when an exception leaves it: for work on the scope's variables.
+/// What the task threw is told by its wait() alone; where that was not called it is lost.
+class SideTaskGuard {
+ public:
+  explicit SideTaskGuard(SideTask& task) : task_(task) {}
+  ~SideTaskGuard();
+  SideTaskGuard(const SideTaskGuard&) = delete;
+  SideTaskGuard& operator=(const SideTaskGuard&) = delete;
+
+ private:
+  SideTask& task_;
+};
+
 }  // namespace semvslam

@@ -64,5 +64,24 @@ TEST(SideTask, ItsEndWaits) {
   EXPECT_TRUE(done);
 }
 
+TEST(SideTask, AGuardedScopeDoesNotEndBefore) {
+  SideTask task;
+  std::atomic<bool> left = false, done = false;
+  const auto scope = [&] {
+    const SideTaskGuard guard(task);
+    task.start([&] {
+      left.wait(false);
+      done = true;
+      throw std::runtime_error("nobody asks");
+    });
+    left = true;
+    left.notify_all();
+    throw std::logic_error("the scope's own");
+  };
+  EXPECT_THROW(scope(), std::logic_error);
+  EXPECT_TRUE(done);
+  task.wait();  // the guard has taken what it threw
+}
+
 }  // namespace
 }  // namespace semvslam

@@ -230,6 +230,11 @@ Result<std::unique_ptr<FrameSource>> open_sequence(const fs::path& folder, const
   return std::unique_ptr<FrameSource>(std::move(sequence));
 }
 
+Result<std::optional<RgbdFrame>> next_readable(FrameSource& source) {
+  for (;;)
+    if (Result<std::optional<RgbdFrame>> next = source.next(); next || source.fatal()) return next;
+}
+
 Result<Trajectory> read_ground_truth(const fs::path& path) {
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);

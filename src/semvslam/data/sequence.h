@@ -30,6 +30,10 @@ struct SequenceOptions {
 /// with the first.
 Result<std::unique_ptr<FrameSource>> open_sequence(const std::filesystem::path& folder, const SequenceOptions& options);
 
+/// The next frame that can be read, past those that cannot; an empty optional at the end. Errors: those after which the
+/// source does not go on (FrameSource::fatal).
+Result<std::optional<RgbdFrame>> next_readable(FrameSource& source);
+
 /// A folder that belongs to a recording, such as one of masks: `name` as given, or inside the recording. Errors:
 /// neither is a folder.
 Result<std::filesystem::path> find_folder(const std::filesystem::path& recording, const std::string& name);

@@ -172,6 +172,34 @@ TEST_F(SequenceTest, ReadsMasksByTheNameOfTheColourImage) {
   EXPECT_THAT(open_error(options), HasSubstr("masks: no such folder, neither here nor in "));
 }
 
+TEST_F(SequenceTest, FramesThatCannotBeReadArePassedOver) {
+  make_tum(5);
+  write_text(folder_ / "rgb/1.png", "no picture");
+  write_text(folder_ / "rgb/3.png", "none either");
+  const auto source = open();
+  std::vector<FrameId> read;
+  for (;;) {
+    const auto frame = next_readable(*source);
+    ASSERT_TRUE(frame.ok()) << frame.error().message;
+    if (!*frame) break;
+    read.push_back((*frame)->id);
+  }
+  EXPECT_THAT(read, ElementsAre(FrameId(0), FrameId(2), FrameId(4)));
+}
+
+TEST(NextReadable, AnErrorThatEndsTheSourceIsNotPassedOver) {
+  struct Broken final : FrameSource {
+    Result<std::optional<RgbdFrame>> next() override { return Error{ErrorCode::kIo, "unplugged"}; }
+    bool fatal() const override { return true; }
+    const Camera& camera() const override { return its_camera; }
+    std::string description() const override { return "broken"; }
+    Camera its_camera;
+  } source;
+  const auto frame = next_readable(source);
+  ASSERT_FALSE(frame.ok());
+  EXPECT_EQ(frame.error().message, "unplugged");
+}
+
 TEST_F(SequenceTest, SaysWhatIsWrongWithAFolder) {
   const auto message = [](const std::filesystem::path& path) { return open_sequence(path, {}).error().message; };
   EXPECT_THAT(message(folder_ / "nowhere"), HasSubstr("no such folder"));

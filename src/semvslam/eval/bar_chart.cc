@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kBarWidth_px = 24, kGroupGap_px = 26, kLeastWidth_px = 420;
 constexpr double kHeadRoom = 0.1, kHeadRoomUpwards = 0.22;  // for the value on the largest bar, share of the axis
-constexpr double kLogarithmicFrom = 10;                     // ratio of the largest value and the least
 constexpr double kDigitWidth_px = 6;                        // of the values on the bars, at most
 
 /// Beside each other the values need no more room than the bars; longer ones are written upwards.
@@ -33,7 +32,7 @@ AxisRange axis_of(const BarChart& chart) {
       if (is_upwards(three_digits(v))) room = kHeadRoomUpwards;
     }
   }
-  if (high <= kLogarithmicFrom * low) return {0, high > 0 ? high / (1 - room) : 1.0};
+  if (!wants_logarithmic(low, high)) return {0, high > 0 ? high / (1 - room) : 1.0};
   AxisRange range = extent.range();
   if (range.low > 0.7 * low) range.low *= 0.5;  // the least bar should be seen
   while (range.share(high) > 1 - room) range.high *= 1.5;

@@ -11,6 +11,7 @@
 
 #include "semvslam/eval/bar_chart.h"
 #include "semvslam/eval/published.h"
+#include "semvslam/eval/svg_axes.h"
 #include "semvslam/eval/svg_chart.h"
 #include "semvslam/eval/table.h"
 #include "semvslam/eval/timed_series.h"
@@ -23,7 +24,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kWidth_px = 960, kTimeChartHeight_px = 210;
 constexpr std::size_t kFewestColumns = 2, kMostColumns = 3;  // of trajectories
 constexpr std::size_t kDifferences = 200;                    // lines between truth and estimate at most
-constexpr double kLogarithmicFrom = 10;                      // ratio of the largest and the least RMSE
 
 /// The two axes along which the true positions extend most, the first letters first.
 std::array<int, 2> widest_plane(const std::vector<Eigen::Vector3d>& positions) {
@@ -59,7 +59,7 @@ Chart trajectory_panel(const DrawnRun& run, std::array<int, 2> plane) {
         std::move(style), e.stamps, [&](std::size_t i) { return positions[i][plane[0]]; },
         [&](std::size_t i) { return positions[i][plane[1]]; });
   };
-  chart.series = {differences(e, plane), line(e.reference, {"", kDrawnTruthColour, {}, {}, true}),
+  chart.series = {differences(e, plane), line(e.reference, {"", kTruthColour, {}, {}, true}),
                   line(e.estimate, {"", mode_colour(run.mode), {}, {}, false})};
   return chart;
 }
@@ -98,7 +98,7 @@ bool differ_much(const DrawnSequence& drawn, const TimedError& kind) {
     const double rmse = kind.statistics(run.evaluation).rmse;
     low = std::min(low, rmse), high = std::max(high, rmse);
   }
-  return low > 0 && high > kLogarithmicFrom * low;
+  return low > 0 && wants_logarithmic(low, high);
 }
 
 Chart time_chart(const DrawnSequence& drawn, const TimedError& kind) {
@@ -153,8 +153,7 @@ void add_published(std::span<const DrawnSystem> systems, BarChart& chart) {
       if (system.system != name) continue;
       BarSeries series{std::string(name), colour, {}};
       for (const std::string& sequence : chart.groups) {
-        const auto known = paper_sequence(sequence);
-        const auto error = known ? system.ate_rmse_m(*known) : std::nullopt;
+        const auto error = system.ate_rmse_m(sequence);
         series.values.push_back(error ? kToMm * *error : kNan);
       }
       chart.series.push_back(std::move(series));
@@ -171,10 +170,9 @@ bool has_bar(const BarChart& chart) {
 }  // namespace
 
 std::string mode_colour(std::string_view mode) {
-  // orb and full as `semvslam eval` draws the other estimate and ours.
   constexpr std::pair<std::string_view, const char*> kColours[] = {
-      {"orb", "#e6740b"},          {"boxes", "#b59a00"},  {"masks", "#8d5fd3"}, {"masks+repair", "#d0428f"},
-      {"masks+motion", "#1f9e89"}, {"motion", "#4c9a2a"}, {"full", "#0868ac"}};
+      {"orb", kAgainstColour},     {"boxes", "#b59a00"},  {"masks", "#8d5fd3"},     {"masks+repair", "#d0428f"},
+      {"masks+motion", "#1f9e89"}, {"motion", "#4c9a2a"}, {"full", kEstimateColour}};
   for (const auto& [name, colour] : kColours)
     if (name == mode) return colour;
   return "#000000";

@@ -23,7 +23,6 @@ struct DrawnSequence {
   std::vector<DrawnRun> runs;
 };
 
-inline constexpr const char* kDrawnTruthColour = "#555555";
 inline constexpr const char* kDrawnDifferenceColour = "#e05050";
 
 /// "#rrggbb", the same for a mode in every figure.

@@ -4,6 +4,7 @@
 
 #include "semvslam/eval/bench_tables.h"
 #include "semvslam/eval/markup.h"
+#include "semvslam/eval/svg_chart.h"
 
 namespace semvslam {
 namespace {
@@ -69,7 +70,7 @@ std::string sequence_figures(const DrawnSequence& drawn) {
     numbers += fmt::format("{}{}: run {}, {:.1f} % of the frames that have a true pose tracked",
                            numbers.empty() ? "" : "; ", run.mode, run.number, 100 * run.evaluation.tracked_share);
   }
-  const std::string legend = legend_entry("ground truth", kDrawnTruthColour, true) +
+  const std::string legend = legend_entry("ground truth", kTruthColour, true) +
                              legend_entry("difference at equal times", kDrawnDifferenceColour) + legend_of(modes);
   return fmt::format(
       "<h3>{}</h3>\n<p class=\"legend\">{}</p>\n<div class=\"wide\">{}</div>\n<div class=\"wide\">{}</div>\n"

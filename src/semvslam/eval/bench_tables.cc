@@ -107,8 +107,7 @@ void add_published_errors(const BenchResults& results, Table& table) {
     std::vector<std::string> row = {std::string(system.system), kOthers};
     bool any = false;
     for (const std::string& sequence : results.sequences) {
-      const auto known = paper_sequence(sequence);
-      const auto error = known ? system.ate_rmse_m(*known) : std::nullopt;
+      const auto error = system.ate_rmse_m(sequence);
       row.push_back(error ? three_digits(kToMm * *error) : "");
       any = any || error;
     }

@@ -9,10 +9,6 @@
 namespace semvslam {
 namespace {
 
-constexpr const char* kTruthColour = "#555555";
-constexpr const char* kEstimateColour = "#0868ac";
-constexpr const char* kAgainstColour = "#e6740b";
-
 struct Curve {
   std::string label, colour;
   std::vector<TimeStamp> stamps;

@@ -87,6 +87,11 @@ std::optional<double> PublishedSystem::ate_rmse_m(PaperSequence sequence) const 
   return value > 0 ? std::optional(value) : std::nullopt;
 }
 
+std::optional<double> PublishedSystem::ate_rmse_m(std::string_view folder_name) const {
+  const std::optional<PaperSequence> sequence = paper_sequence(folder_name);
+  return sequence ? ate_rmse_m(*sequence) : std::nullopt;
+}
+
 std::span<const PublishedSystem> published_systems() { return kSystems; }
 std::span<const PublishedRelativeError> published_relative_errors() { return kRelativeErrors; }
 

@@ -33,6 +33,8 @@ struct PublishedSystem {
   std::string_view hardware;                              // that this time was measured on
 
   std::optional<double> ate_rmse_m(PaperSequence sequence) const;
+  /// The same by the name of a folder; absent too where that is none of the paper's recordings.
+  std::optional<double> ate_rmse_m(std::string_view folder_name) const;
 };
 /// Tables VI and VII of the paper, and one system without a GPU that came later.
 std::span<const PublishedSystem> published_systems();

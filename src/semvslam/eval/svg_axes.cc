@@ -51,6 +51,11 @@ double AxisRange::share(double value) const {
   return std::log(value / low) / std::log(high / low);
 }
 
+bool wants_logarithmic(double low, double high) {
+  constexpr double kRatio = 10;
+  return high > kRatio * low;
+}
+
 void AxisExtent::include(const std::vector<double>& values) {
   for (double v : values) {
     if (!std::isfinite(v) || (logarithmic_ && v <= 0)) continue;

@@ -30,6 +30,9 @@ class AxisExtent {
   double low_ = 0, high_ = 0;
 };
 
+/// Whether positive values from low to high differ so much that a linear axis would hide the small ones.
+bool wants_logarithmic(double low, double high);
+
 struct AxisTick {
   double value = 0;
   std::string label;

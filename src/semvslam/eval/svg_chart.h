@@ -5,6 +5,11 @@
 
 namespace semvslam {
 
+/// Of the same thing in every drawing: the truth, the estimate that matters, the one it is compared with.
+inline constexpr const char* kTruthColour = "#555555";
+inline constexpr const char* kEstimateColour = "#0868ac";
+inline constexpr const char* kAgainstColour = "#e6740b";
+
 /// One line of a chart. A NaN in x or y breaks the line.
 struct ChartSeries {
   std::string label, colour;  // colour: "#rrggbb"

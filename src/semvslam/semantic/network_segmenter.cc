@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 
 #include "semvslam/semantic/image_input.h"
 
@@ -195,13 +196,16 @@ Result<std::vector<PastedMask>> NetworkSegmenter::paste_all(const TrunkOutput& t
         ended[lane] = one.error();
     }
   };
-  const std::size_t busy = std::min(graphs.size(), objects.size());
-  for (std::size_t lane = 1; lane < busy; ++lane) {
+  const std::size_t beside = objects.empty() ? 0 : std::min(graphs.size(), objects.size()) - 1;
+  std::deque<SideTaskGuard> guards;
+  while (guards.size() < beside) {
+    const std::size_t lane = guards.size() + 1;
     if (beside_.size() < lane) beside_.push_back(std::make_unique<SideTask>());
+    guards.emplace_back(*beside_[lane - 1]);
     beside_[lane - 1]->start([&work, lane] { work(lane); });
   }
-  if (busy > 0) work(0);
-  for (std::size_t lane = 1; lane < busy; ++lane) beside_[lane - 1]->wait();
+  work(0);
+  for (std::size_t k = 0; k < beside; ++k) beside_[k]->wait();
   for (const Status& s : ended)
     if (!s) return s.error();
   return pasted;
