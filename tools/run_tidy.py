@@ -32,6 +32,17 @@ def flags_of(entry):
     return out
 
 
+def compiled_files(build):
+    """(source file, flags) of everything that is compiled; a unity file stands for those that it includes."""
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        file, flags = pathlib.Path(entry["file"]), flags_of(entry)
+        if file.parent.name == "Unity":
+            for name in re.findall(r'^#include "(.*)"$', file.read_text(), re.MULTILINE):
+                yield pathlib.Path(name), flags
+        else:
+            yield file, flags
+
+
 def changed_files():
     for base in ("origin/main", "HEAD~1"):
         done = subprocess.run(["git", "-C", str(ROOT), "diff", "--name-only", base], stdout=subprocess.PIPE,
@@ -45,20 +56,19 @@ def changed_files():
 def work_list(build, everything):
     """(file, flags) for each run of clang-tidy."""
     changed, modules, work = changed_files(), {}, []
-    for entry in json.loads((build / "compile_commands.json").read_text()):
-        file = pathlib.Path(entry["file"])
+    for file, flags in compiled_files(build):
         if not file.is_relative_to(SOURCE) or IS_TEST.search(file.name):
             continue
-        modules.setdefault(file.relative_to(SOURCE).parts[0], entry)
+        modules.setdefault(file.relative_to(SOURCE).parts[0], flags)
         if everything or file in changed:
-            work.append((file, flags_of(entry)))
+            work.append((file, flags))
     folder = build / "tidy"
     folder.mkdir(exist_ok=True)
-    for module, entry in sorted(modules.items()):
+    for module, flags in sorted(modules.items()):
         headers = sorted(h for h in (SOURCE / module).glob("*.h") if not IS_TEST.search(h.name))
         collected = folder / f"{module}_headers.cc"
         collected.write_text("".join(f'#include "{h.relative_to(ROOT / "src")}"\n' for h in headers))
-        work.append((collected, flags_of(entry)))
+        work.append((collected, flags))
     return work
 
 

@@ -13,14 +13,10 @@
 #include <utility>
 
 #include "semvslam/base/foreign_text.h"
+#include "semvslam/base/yaml_limits.h"
 
 namespace semvslam {
 namespace {
-
-constexpr std::size_t kMaxTextBytes = 1 << 20;
-constexpr int kMaxNesting = 16;
-
-Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
 
 template <typename T>
 bool parse_number(const std::string& text, T* value) {
@@ -73,7 +69,7 @@ struct Flattener {
 
   // The path from an unknown section to its first scalar, so that the nearest known key can be a whole one.
   static std::string first_leaf(std::string path, YAML::Node node) {
-    for (int depth = 0; depth < kMaxNesting && node.IsMap() && node.size() > 0; ++depth) {
+    for (int depth = 0; depth < kMaxYamlNesting && node.IsMap() && node.size() > 0; ++depth) {
       const auto first = *node.begin();
       if (!first.first.IsScalar()) break;
       path += '.' + first.first.Scalar();
@@ -84,22 +80,23 @@ struct Flattener {
 
   Status visit(const YAML::Node& map, const std::string& prefix, int depth) {
     for (const auto& item : map) {
-      if (!item.first.IsScalar()) return invalid(fmt::format("{}: keys must be plain words", where(item.first)));
+      if (!item.first.IsScalar()) return invalid_input(fmt::format("{}: keys must be plain words", where(item.first)));
       const std::string path = prefix + item.first.Scalar();
       const std::string at = where(item.first);
       if (sections.contains(path)) {
         if (item.second.IsNull()) continue;
         if (!item.second.IsMap())
-          return invalid(fmt::format("{}: '{}' is a section: indent 'key: value' lines below it", at, path));
-        if (depth >= kMaxNesting) return invalid(fmt::format("{}: sections are nested too deeply", at));
+          return invalid_input(fmt::format("{}: '{}' is a section: indent 'key: value' lines below it", at, path));
+        if (depth >= kMaxYamlNesting) return invalid_input(fmt::format("{}: sections are nested too deeply", at));
         if (const Status status = visit(item.second, path + '.', depth + 1); !status) return status;
       } else if (!keys.contains(path)) {
         unknown_key = first_leaf(path, item.second);
         unknown_where = at;
-        return invalid("unknown key");
+        return invalid_input("unknown key");
       } else if (!item.second.IsScalar()) {
-        return invalid(fmt::format("{}: {} needs one value, got {}", at, path,
-                                   item.second.IsNull() ? "none" : (item.second.IsMap() ? "a section" : "a list")));
+        return invalid_input(
+            fmt::format("{}: {} needs one value, got {}", at, path,
+                        item.second.IsNull() ? "none" : (item.second.IsMap() ? "a section" : "a list")));
       } else {
         found.push_back({path, item.second.Scalar(), at});
       }
@@ -126,9 +123,9 @@ void ConfigSchema::add_number(std::string key, Number* field, Range range, std::
   const auto check = [range](const std::string& text) -> Status {
     Number value = 0;
     if (!parse_number(text, &value) || !std::isfinite(static_cast<double>(value)))
-      return invalid((kWhole ? "must be an integer, got " : "must be a number, got ") + in_quotes(text));
+      return invalid_input((kWhole ? "must be an integer, got " : "must be a number, got ") + in_quotes(text));
     if (!(value >= range.low && value <= range.high))
-      return invalid(fmt::format("must be in {}, got {}", range_to_text(range), value));
+      return invalid_input(fmt::format("must be in {}, got {}", range_to_text(range), value));
     return Status::success();
   };
   add_entry({.key = std::move(key),
@@ -153,7 +150,7 @@ void ConfigSchema::add(std::string key, double* field, Range range, std::string 
 void ConfigSchema::add(std::string key, bool* field, std::string doc) {
   const auto check = [](const std::string& text) -> Status {
     bool value = false;
-    if (!parse_bool(text, &value)) return invalid("must be true or false, got " + in_quotes(text));
+    if (!parse_bool(text, &value)) return invalid_input("must be true or false, got " + in_quotes(text));
     return Status::success();
   };
   add_entry({.key = std::move(key),
@@ -171,7 +168,7 @@ void ConfigSchema::add(std::string key, std::string* field, std::vector<std::str
   const std::string listed = fmt::format("{}", fmt::join(choices, ", "));
   const auto check = [choices, listed](const std::string& text) -> Status {
     if (choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end()) return Status::success();
-    return invalid(fmt::format("must be one of {}; got {}", listed, in_quotes(text)));
+    return invalid_input(fmt::format("must be one of {}; got {}", listed, in_quotes(text)));
   };
   add_entry({.key = std::move(key),
              .type = "text",
@@ -185,11 +182,11 @@ void ConfigSchema::add(std::string key, std::string* field, std::vector<std::str
 }
 
 Status ConfigSchema::load_yaml(const std::string& text, const std::string& origin) {
-  if (text.size() > kMaxTextBytes) return invalid(origin + ": a configuration file has less than 1 MB");
+  if (text.size() > kMaxYamlBytes) return invalid_input(origin + ": a configuration file has less than 1 MB");
   try {
     const YAML::Node root = YAML::Load(text);
     if (root.IsNull()) return Status::success();
-    if (!root.IsMap()) return invalid(origin + ":1: expected 'key: value' lines");
+    if (!root.IsMap()) return invalid_input(origin + ":1: expected 'key: value' lines");
 
     std::set<std::string, std::less<>> known, sections;
     for (const Entry& entry : entries_) {
@@ -204,27 +201,28 @@ Status ConfigSchema::load_yaml(const std::string& text, const std::string& origi
     std::map<std::string, std::string> first_seen;
     for (const Assignment& a : flat.found) {
       const auto [earlier, is_new] = first_seen.emplace(a.key, a.where);
-      if (!is_new) return invalid(fmt::format("{}: {} is set twice, first at {}", a.where, a.key, earlier->second));
+      if (!is_new)
+        return invalid_input(fmt::format("{}: {} is set twice, first at {}", a.where, a.key, earlier->second));
       if (const Status status = find(a.key)->check(a.value); !status)
-        return invalid(fmt::format("{}: {} {}", a.where, a.key, status.error().message));
+        return invalid_input(fmt::format("{}: {} {}", a.where, a.key, status.error().message));
     }
     for (const Assignment& a : flat.found) find(a.key)->assign(a.value);
     return Status::success();
   } catch (const YAML::Exception& e) {
-    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, in_quotes(e.msg)));
+    return invalid_input(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, in_quotes(e.msg)));
   }
 }
 
 Status ConfigSchema::set(std::string_view assignment, std::string_view origin) {
   const auto equals = assignment.find('=');
   if (equals == std::string_view::npos)
-    return invalid(fmt::format("{} needs key=value, got {}", origin, in_quotes(assignment)));
+    return invalid_input(fmt::format("{} needs key=value, got {}", origin, in_quotes(assignment)));
   const std::string_view key = assignment.substr(0, equals);
   const std::string value(assignment.substr(equals + 1));
   const Entry* entry = find(key);
   if (entry == nullptr) return unknown_key(key, std::string(origin));
   if (const Status status = entry->check(value); !status)
-    return invalid(fmt::format("{}: {} {}", origin, entry->key, status.error().message));
+    return invalid_input(fmt::format("{}: {} {}", origin, entry->key, status.error().message));
   entry->assign(value);
   return Status::success();
 }
@@ -290,7 +288,7 @@ Error ConfigSchema::unknown_key(std::string_view key, const std::string& where) 
     if (distance < best) best = distance, nearest = &entry;
   }
   const std::string hint = nearest == nullptr ? "" : fmt::format("; the nearest known one is '{}'", nearest->key);
-  return invalid(fmt::format("{}: unknown key {}{}", where, in_quotes(key), hint));
+  return invalid_input(fmt::format("{}: unknown key {}{}", where, in_quotes(key), hint));
 }
 
 }  // namespace semvslam

@@ -22,6 +22,8 @@ struct Error {
   std::string message;
 };
 
+inline Error invalid_input(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
+
 /// Either a value or an Error. Ignoring one is a warning; reading the absent side is a programming error (assert).
 template <typename T>
 class [[nodiscard]] Result {

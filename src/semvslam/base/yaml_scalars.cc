@@ -9,15 +9,12 @@
 #include <utility>
 
 #include "semvslam/base/foreign_text.h"
+#include "semvslam/base/yaml_limits.h"
 
 namespace semvslam {
 namespace {
 
-constexpr std::size_t kMaxTextBytes = 1 << 20;
 constexpr std::size_t kMaxScalars = 10'000;  // aliases can make many of a short text
-constexpr int kMaxNesting = 16;
-
-Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
 
 bool is_plain_word(const std::string& key) {
   const auto plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-'; };
@@ -42,7 +39,7 @@ struct Collector {
   Status visit_map(const YAML::Node& map, const std::string& path, int depth) {
     for (const auto& item : map) {
       if (!item.first.IsScalar() || !is_plain_word(item.first.Scalar()))
-        return invalid(fmt::format("{}: keys must be plain words", where(item.first)));
+        return invalid_input(fmt::format("{}: keys must be plain words", where(item.first)));
       const std::string below = path.empty() ? item.first.Scalar() : path + '.' + item.first.Scalar();
       if (Status status = visit(item.second, below, where(item.first), depth + 1); !status) return status;
     }
@@ -50,15 +47,15 @@ struct Collector {
   }
 
   Status visit(const YAML::Node& node, const std::string& path, const std::string& at, int depth) {
-    if (depth > kMaxNesting) return invalid(fmt::format("{}: nested too deeply", at));
+    if (depth > kMaxYamlNesting) return invalid_input(fmt::format("{}: nested too deeply", at));
     if (node.IsScalar()) {
-      if (!paths.insert(path).second) return invalid(fmt::format("{}: {} is set twice", at, in_quotes(path)));
-      if (found.size() == kMaxScalars) return invalid(fmt::format("{}: more than {} values", at, kMaxScalars));
+      if (!paths.insert(path).second) return invalid_input(fmt::format("{}: {} is set twice", at, in_quotes(path)));
+      if (found.size() == kMaxScalars) return invalid_input(fmt::format("{}: more than {} values", at, kMaxScalars));
       found.push_back({path, node.Scalar(), at});
       return Status::success();
     }
     if (!(node.IsMap() || node.IsSequence()) || node.size() == 0)
-      return invalid(fmt::format("{}: {} has no value", at, in_quotes(path)));
+      return invalid_input(fmt::format("{}: {} has no value", at, in_quotes(path)));
     return node.IsMap() ? visit_map(node, path, depth) : visit_list(node, path, depth);
   }
 };
@@ -66,16 +63,16 @@ struct Collector {
 }  // namespace
 
 Result<std::vector<YamlScalar>> yaml_scalars(const std::string& text, const std::string& origin) {
-  if (text.size() > kMaxTextBytes) return invalid(origin + ": such a file has less than 1 MB");
+  if (text.size() > kMaxYamlBytes) return invalid_input(origin + ": such a file has less than 1 MB");
   try {
     const YAML::Node root = YAML::Load(text);
     if (root.IsNull()) return std::vector<YamlScalar>();
-    if (!root.IsMap()) return invalid(origin + ":1: expected 'key: value' lines");
+    if (!root.IsMap()) return invalid_input(origin + ":1: expected 'key: value' lines");
     Collector collector{origin, {}, {}};
     if (Status status = collector.visit_map(root, "", 0); !status) return status.error();
     return std::move(collector.found);
   } catch (const YAML::Exception& e) {
-    return invalid(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, in_quotes(e.msg)));
+    return invalid_input(fmt::format("{}:{}: not valid YAML: {}", origin, e.mark.line + 1, in_quotes(e.msg)));
   }
 }
 

@@ -11,8 +11,6 @@
 namespace semvslam {
 namespace {
 
-Error corrupt(const char* what) { return {ErrorCode::kInvalidInput, what}; }
-
 const char* bits_name(int cv_depth) {
   switch (cv_depth) {
     case CV_8U:
@@ -109,15 +107,15 @@ Result<std::optional<PngPixels>> ImageDecoder::decode_png(ByteSpan file) {
 
 Status ImageDecoder::decode_other(ByteSpan file, cv::Mat& image) {
   // Here OpenCV would return what it has of a file that breaks off.
-  if (is_png(file) && !png_is_whole(file)) return corrupt("the PNG is truncated");
-  if (is_jpeg(file) && !jpeg_has_end(file)) return corrupt("the JPEG is truncated");
+  if (is_png(file) && !png_is_whole(file)) return invalid_input("the PNG is truncated");
+  if (is_jpeg(file) && !jpeg_has_end(file)) return invalid_input("the JPEG is truncated");
   try {
     const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
     image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {
     image.release();
   }
-  if (image.empty()) return corrupt("not an image, or a corrupt one");
+  if (image.empty()) return invalid_input("not an image, or a corrupt one");
   return check_size(image.size());
 }
 

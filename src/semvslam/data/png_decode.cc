@@ -15,8 +15,7 @@ constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '
 constexpr std::size_t kHeaderBytes = 13, kChunkOverhead = 12;  // length, type, checksum
 constexpr std::size_t kMaxDeflateRatio = 1032;                 // 258 bytes from 2 bits
 
-Error corrupt(const char* what) { return {ErrorCode::kInvalidInput, what}; }
-Error truncated() { return corrupt("the PNG is truncated"); }
+Error truncated() { return invalid_input("the PNG is truncated"); }
 
 std::uint32_t big_endian_32(const std::uint8_t* p) {
   return std::uint32_t{p[0]} << 24 | std::uint32_t{p[1]} << 16 | std::uint32_t{p[2]} << 8 | p[3];
@@ -37,7 +36,7 @@ Result<std::optional<Chunk>> read_chunk(ByteSpan file, std::size_t at) {
   Chunk chunk{
       {reinterpret_cast<const char*>(&file[at + 4]), 4}, file.subspan(at + 8, length), at + kChunkOverhead + length};
   if (chunk.critical() && libdeflate_crc32(0, &file[at + 4], length + 4) != big_endian_32(&file[at + 8 + length]))
-    return corrupt("the PNG is corrupt (checksum)");
+    return invalid_input("the PNG is corrupt (checksum)");
   return std::optional<Chunk>(chunk);
 }
 
@@ -92,12 +91,12 @@ bool png_is_whole(ByteSpan file) {
 }
 
 Result<PngHeader> read_png_header(ByteSpan file) {
-  if (!is_png(file)) return corrupt("not a PNG file");
+  if (!is_png(file)) return invalid_input("not a PNG file");
   const Result<std::optional<Chunk>> chunk = read_chunk(file, 8);
   if (!chunk) return chunk.error();
   if (!chunk->has_value()) return truncated();
   const Chunk& c = **chunk;
-  if (c.type != "IHDR" || c.data.size() != kHeaderBytes) return corrupt("the PNG is corrupt (header)");
+  if (c.type != "IHDR" || c.data.size() != kHeaderBytes) return invalid_input("the PNG is corrupt (header)");
   PngHeader header;
   header.width_px = big_endian_32(&c.data[0]);
   header.height_px = big_endian_32(&c.data[4]);
@@ -108,7 +107,7 @@ Result<PngHeader> read_png_header(ByteSpan file) {
       header.bits == 1 || header.bits == 2 || header.bits == 4 || header.bits == 8 || header.bits == 16;
   if (!colour || !known_bits || header.width_px - 1 > 0x7ffffffeu || header.height_px - 1 > 0x7ffffffeu ||
       c.data[10] != 0 || c.data[11] != 0 || c.data[12] > 1)
-    return corrupt("the PNG is corrupt (header)");
+    return invalid_input("the PNG is corrupt (header)");
   header.colour = *colour;
   return header;
 }
@@ -148,11 +147,11 @@ Status PngDecoder::join_data(ByteSpan file) {
       }
       joined_.insert(joined_.end(), c.data.begin(), c.data.end());
     } else if (c.critical() && c.type != "IHDR" && c.type != "PLTE") {
-      return corrupt("the PNG is corrupt (unknown critical chunk)");
+      return invalid_input("the PNG is corrupt (unknown critical chunk)");
     }
   }
   if (pieces > 1) data_ = joined_;
-  return pieces == 0 ? Status(corrupt("the PNG is corrupt (no image data)")) : Status::success();
+  return pieces == 0 ? Status(invalid_input("the PNG is corrupt (no image data)")) : Status::success();
 }
 
 Result<PngPixels> PngDecoder::decode(ByteSpan file) {
@@ -167,13 +166,13 @@ Result<PngPixels> PngDecoder::decode(ByteSpan file) {
   // Without the size that came out, libdeflate demands that it be exactly this one.
   if (libdeflate_zlib_decompress(inflater_->decompressor.get(), data_.data(), data_.size(), rows_.data(), rows_.size(),
                                  nullptr) != LIBDEFLATE_SUCCESS)
-    return corrupt("the PNG is corrupt (compressed data)");
+    return invalid_input("the PNG is corrupt (compressed data)");
   zeros_.resize(std::max(zeros_.size(), stride));
   const std::uint8_t* above = zeros_.data();
   for (std::uint32_t y = 0; y < header->height_px; ++y) {
     std::uint8_t* row = rows_.data() + y * stride;
     if (!png_unfilter_row(row[0], row + 1, above, stride - 1, static_cast<int>(pixel_bytes)))
-      return corrupt("the PNG is corrupt (row filter)");
+      return invalid_input("the PNG is corrupt (row filter)");
     above = row + 1;
   }
   return PngPixels{*header, rows_.data() + 1, stride};

@@ -39,7 +39,7 @@ Bytes pixels_for(const PngRecipe& r, unsigned seed = 1) {
   return random_pixels(static_cast<std::size_t>(r.width) * r.height * r.channels * r.bits / 8, seed);
 }
 
-std::string error_of(const Bytes& png) {
+std::string png_error(const Bytes& png) {
   PngDecoder decoder;
   const Result<PngPixels> pixels = decoder.decode(png);
   return pixels ? "" : pixels.error().message;
@@ -90,13 +90,13 @@ TEST(PngDecode, EveryTruncationIsAnError) {
   PngRecipe r = recipe(20, 10, 16, 0);
   r.chunk_bytes = 100;
   const Bytes png = make_png(r, pixels_for(r));
-  ASSERT_EQ(error_of(png), "");
+  ASSERT_EQ(png_error(png), "");
   for (std::size_t length = 0; length < png.size(); ++length) {
-    const std::string error = error_of(Bytes(png.begin(), png.begin() + length));
+    const std::string error = png_error(Bytes(png.begin(), png.begin() + length));
     ASSERT_NE(error, "") << length << " of " << png.size() << " bytes";
     EXPECT_FALSE(png_is_whole(Bytes(png.begin(), png.begin() + length)));
   }
-  EXPECT_THAT(error_of(Bytes(png.begin(), png.begin() + png.size() / 2)), HasSubstr("truncated"));
+  EXPECT_THAT(png_error(Bytes(png.begin(), png.begin() + png.size() / 2)), HasSubstr("truncated"));
   EXPECT_TRUE(png_is_whole(png));
 }
 
@@ -106,7 +106,7 @@ TEST(PngDecode, EveryFlippedBitOfTheImageIsAnError) {
   for (std::size_t i = 0; i < png.size() * 8; ++i) {
     Bytes damaged = png;
     damaged[i / 8] ^= static_cast<std::uint8_t>(1 << i % 8);
-    ASSERT_NE(error_of(damaged), "") << "byte " << i / 8;
+    ASSERT_NE(png_error(damaged), "") << "byte " << i / 8;
   }
 }
 
@@ -122,20 +122,20 @@ TEST(PngDecode, RefusesAnImageThatItsDataCannotHold) {
   put_chunk(png, "IHDR", header);
   put_chunk(png, "IDAT", zlib(pixels));
   put_chunk(png, "IEND", {});
-  EXPECT_THAT(error_of(png), HasSubstr("truncated"));
+  EXPECT_THAT(png_error(png), HasSubstr("truncated"));
 }
 
 TEST(PngDecode, RefusesAnUnknownFilterAndNoData) {
   PngRecipe r = recipe(4, 4, 8, 0);
   r.filters = {0, 5};
-  EXPECT_THAT(error_of(make_png(r, pixels_for(r))), HasSubstr("row filter"));
+  EXPECT_THAT(png_error(make_png(r, pixels_for(r))), HasSubstr("row filter"));
   r = recipe(4, 4, 8, 0);
   r.chunk_bytes = 1u << 30;
   Bytes png = make_png(r, pixels_for(r));
   const Bytes head(png.begin(), png.begin() + 33);
   Bytes empty = head;
   put_chunk(empty, "IEND", {});
-  EXPECT_THAT(error_of(empty), HasSubstr("no image data"));
+  EXPECT_THAT(png_error(empty), HasSubstr("no image data"));
 }
 
 TEST(PngDecode, LeavesUnusualKindsToOthers) {

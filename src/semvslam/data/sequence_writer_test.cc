@@ -11,12 +11,12 @@ namespace {
 using namespace testing_support;
 using ::testing::HasSubstr;
 
-constexpr int kWidth = 64, kHeight = 48;
+constexpr int kWrittenWidth = 64, kWrittenHeight = 48;
 
 Camera test_camera() {
   Camera camera;
-  camera.width_px = kWidth;
-  camera.height_px = kHeight;
+  camera.width_px = kWrittenWidth;
+  camera.height_px = kWrittenHeight;
   camera.fx_px = 50.0 / 3;
   camera.fy_px = 51;
   camera.cx_px = 31.5;
@@ -30,11 +30,11 @@ RgbdFrame test_frame(int i) {
   RgbdFrame frame;
   frame.id = FrameId(static_cast<std::uint32_t>(i));
   frame.stamp.ns = 1305031102175304001 + i * std::int64_t{33333333};
-  frame.colour = cv::Mat(kHeight, kWidth, CV_8UC3);
+  frame.colour = cv::Mat(kWrittenHeight, kWrittenWidth, CV_8UC3);
   cv::RNG random(static_cast<std::uint64_t>(i) + 1);
   random.fill(frame.colour, cv::RNG::UNIFORM, 0, 256);
-  frame.gray = gray_picture(kWidth, kHeight, i);
-  frame.depth = depth_picture(kWidth, kHeight, i);
+  frame.gray = gray_picture(kWrittenWidth, kWrittenHeight, i);
+  frame.depth = depth_picture(kWrittenWidth, kWrittenHeight, i);
   return frame;
 }
 
@@ -47,7 +47,7 @@ TEST(SequenceWriter, WhatIsWrittenIsReadBackIdentically) {
     ASSERT_TRUE(writer.ok()) << writer.error().message;
     for (int i = 0; i < 3; ++i) {
       RgbdFrame frame = test_frame(i);
-      frame.mask = gray_picture(kWidth, kHeight, 50 + i);
+      frame.mask = gray_picture(kWrittenWidth, kWrittenHeight, 50 + i);
       ASSERT_TRUE(writer->write(frame, test_pose(i)).ok());
     }
   }
@@ -65,7 +65,7 @@ TEST(SequenceWriter, WhatIsWrittenIsReadBackIdentically) {
     EXPECT_EQ((*frame)->stamp, test_frame(i).stamp);
     EXPECT_TRUE(same_image((*frame)->colour, test_frame(i).colour));
     EXPECT_TRUE(same_image((*frame)->depth, test_frame(i).depth));
-    EXPECT_TRUE(same_image((*frame)->mask, gray_picture(kWidth, kHeight, 50 + i)));
+    EXPECT_TRUE(same_image((*frame)->mask, gray_picture(kWrittenWidth, kWrittenHeight, 50 + i)));
   }
   EXPECT_FALSE((*source)->next()->has_value());
   const Result<Trajectory> truth = read_ground_truth(folder / "s");
@@ -112,7 +112,7 @@ TEST(SequenceWriter, RefusesWhatItCannotWriteWell) {
   const auto message = [&](const RgbdFrame& frame) { return writer->write(frame, std::nullopt).error().message; };
   EXPECT_THAT(message(test_frame(1)), HasSubstr("not after the one before"));
   RgbdFrame frame = test_frame(2);
-  frame.depth = cv::Mat(kHeight, kWidth, CV_32FC1, cv::Scalar(1));
+  frame.depth = cv::Mat(kWrittenHeight, kWrittenWidth, CV_32FC1, cv::Scalar(1));
   EXPECT_THAT(message(frame), HasSubstr("depth must be 16-bit"));
   frame = test_frame(2);
   frame.depth = depth_picture(10, 10, 0);

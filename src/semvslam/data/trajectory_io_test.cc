@@ -12,7 +12,7 @@ namespace {
 using namespace testing_support;
 using ::testing::HasSubstr;
 
-std::string error_of(const std::string& text) {
+std::string trajectory_error(const std::string& text) {
   const Result<ParsedTrajectory> parsed = parse_trajectory(text, "gt.txt");
   return parsed ? "" : parsed.error().message;
 }
@@ -46,15 +46,17 @@ TEST(ParseTrajectory, NormalisesQuaternions) {
 }
 
 TEST(ParseTrajectory, ErrorsNameTheLineAndTheWord) {
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n"), HasSubstr("gt.txt:2: word 2 is not a finite number"));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 inf\n"), HasSubstr("gt.txt:1: word 8 is not a finite number"));
-  EXPECT_THAT(error_of("NaN 0 0 0 0 0 0 1\n"), HasSubstr("gt.txt:1: the time stamp is not a finite number"));
-  EXPECT_THAT(error_of("1 0 0 zero 0 0 0 1\n"), HasSubstr("gt.txt:1: word 4 is not a number"));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0\n"), HasSubstr("expected 8 numbers 't tx ty tz qx qy qz qw', got 7 words"));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 1\n2 0 0"),
+  EXPECT_THAT(trajectory_error("1 0 0 0 0 0 0 1\n2 nan 0 0 0 0 0 1\n"),
+              HasSubstr("gt.txt:2: word 2 is not a finite number"));
+  EXPECT_THAT(trajectory_error("1 0 0 0 0 0 0 inf\n"), HasSubstr("gt.txt:1: word 8 is not a finite number"));
+  EXPECT_THAT(trajectory_error("NaN 0 0 0 0 0 0 1\n"), HasSubstr("gt.txt:1: the time stamp is not a finite number"));
+  EXPECT_THAT(trajectory_error("1 0 0 zero 0 0 0 1\n"), HasSubstr("gt.txt:1: word 4 is not a number"));
+  EXPECT_THAT(trajectory_error("1 0 0 0 0 0 0\n"),
+              HasSubstr("expected 8 numbers 't tx ty tz qx qy qz qw', got 7 words"));
+  EXPECT_THAT(trajectory_error("1 0 0 0 0 0 0 1\n2 0 0"),
               HasSubstr("gt.txt:2: expected 8 numbers 't tx ty tz qx qy qz qw', got 3 words (the file breaks off"));
-  EXPECT_THAT(error_of("1 0 0 0 0 0 0 0\n"), HasSubstr("the quaternion has no direction"));
-  EXPECT_THAT(error_of("1 0 0 0 1e200 0 0 1\n"), HasSubstr("the quaternion has no direction"));
+  EXPECT_THAT(trajectory_error("1 0 0 0 0 0 0 0\n"), HasSubstr("the quaternion has no direction"));
+  EXPECT_THAT(trajectory_error("1 0 0 0 1e200 0 0 1\n"), HasSubstr("the quaternion has no direction"));
 }
 
 TEST(ParseTrajectory, SortsAndDropsDuplicates) {

@@ -17,7 +17,7 @@ FileList list_of(std::initializer_list<std::int64_t> stamps_ms, const std::strin
   return list;
 }
 
-std::string error_of(const std::string& text) {
+std::string file_list_error(const std::string& text) {
   const Result<FileList> list = parse_file_list(text, "rgb.txt");
   return list ? "" : list.error().message;
 }
@@ -49,10 +49,10 @@ TEST(ParseFileList, SortsDropsDuplicatesAndNansAndCountsThem) {
 }
 
 TEST(ParseFileList, ErrorsNameFileAndLine) {
-  EXPECT_THAT(error_of("1 a\n\n# c\nhello world\n"), HasSubstr("rgb.txt:4: 'hello' is no time stamp"));
-  EXPECT_THAT(error_of("1 a\n2\n3 c\n"), HasSubstr("rgb.txt:2: no file name"));
-  EXPECT_THAT(error_of("1e30 a\n"), HasSubstr("rgb.txt:1: '1e30' is no time stamp"));
-  EXPECT_THAT(error_of("\x01\x02 a\n"), HasSubstr("'?\?'"));
+  EXPECT_THAT(file_list_error("1 a\n\n# c\nhello world\n"), HasSubstr("rgb.txt:4: 'hello' is no time stamp"));
+  EXPECT_THAT(file_list_error("1 a\n2\n3 c\n"), HasSubstr("rgb.txt:2: no file name"));
+  EXPECT_THAT(file_list_error("1e30 a\n"), HasSubstr("rgb.txt:1: '1e30' is no time stamp"));
+  EXPECT_THAT(file_list_error("\x01\x02 a\n"), HasSubstr("'?\?'"));
 }
 
 TEST(ParseAssociations, TakesTheStampOfTheColourImageInEitherOrder) {

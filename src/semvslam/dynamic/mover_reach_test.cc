@@ -7,15 +7,15 @@
 namespace semvslam {
 namespace {
 
-constexpr int kWidth = 320, kHeight = 240;
+constexpr int kReachWidth = 320, kReachHeight = 240;
 constexpr float kWallM = 4, kPersonM = 2;
 constexpr double kReachM = 0.6;
 const cv::Rect kTorso(120, 40, 60, 80), kLeg(130, 120, 24, 100);  // the mask ends where the leg begins
 
-Camera small_camera() {
+Camera reach_camera() {
   Camera camera;
-  camera.width_px = kWidth;
-  camera.height_px = kHeight;
+  camera.width_px = kReachWidth;
+  camera.height_px = kReachHeight;
   camera.fx_px = camera.fy_px = 250;  // a pixel is 8 mm wide at the person
   camera.cx_px = 159.5;
   camera.cy_px = 119.5;
@@ -23,14 +23,14 @@ Camera small_camera() {
 }
 
 cv::Mat person_before_wall() {
-  cv::Mat depth(kHeight, kWidth, CV_32FC1, cv::Scalar(kWallM));
+  cv::Mat depth(kReachHeight, kReachWidth, CV_32FC1, cv::Scalar(kWallM));
   depth(kTorso).setTo(kPersonM);
   depth(kLeg).setTo(kPersonM);
   return depth;
 }
 
 MoverReach reach_of_torso(const cv::Mat& depth) {
-  MoverReach reach(small_camera(), depth, kReachM);
+  MoverReach reach(reach_camera(), depth, kReachM);
   reach.add(kTorso, cv::Mat(kTorso.size(), CV_8UC1, cv::Scalar(255)), kPersonM);
   reach.spread();
   return reach;
@@ -56,7 +56,7 @@ TEST(MoverReach, GoesOnBehindASmallHole) {
 TEST(MoverReach, DoesNotFollowASurfaceAwayFromTheBody) {
   // A table that begins at her waist and comes towards the camera: a metre over forty rows.
   cv::Mat depth = person_before_wall();
-  for (int y = 120; y < kHeight; ++y) depth.row(y).setTo(kPersonM - 0.01f * static_cast<float>(y - 119));
+  for (int y = 120; y < kReachHeight; ++y) depth.row(y).setTo(kPersonM - 0.01f * static_cast<float>(y - 119));
   const MoverReach reach = reach_of_torso(depth);
   EXPECT_LT(reach.distance_m({150, 135}), kReachM);
   EXPECT_TRUE(std::isinf(reach.distance_m({150, 160})));
@@ -64,7 +64,7 @@ TEST(MoverReach, DoesNotFollowASurfaceAwayFromTheBody) {
 
 TEST(MoverReach, TheRimOfAMaskMayLieOnWhatIsBehind) {
   cv::Mat depth = person_before_wall();
-  MoverReach reach(small_camera(), depth, kReachM);
+  MoverReach reach(reach_camera(), depth, kReachM);
   const cv::Rect too_wide(kTorso.x - 4, kTorso.y, kTorso.width + 8, kTorso.height);
   reach.add(too_wide, cv::Mat(too_wide.size(), CV_8UC1, cv::Scalar(255)), kPersonM);
   reach.spread();
@@ -88,7 +88,7 @@ TEST(MoverReach, WithoutDepthNothingIsConnected) {
   const MoverReach reach = reach_of_torso(cv::Mat());
   EXPECT_TRUE(std::isinf(reach.distance_m({140, 145})));
   EXPECT_TRUE(reach.is_at_edge({140, 145})) << "no depth says that it is another thing";
-  MoverReach unknown(small_camera(), person_before_wall(), kReachM);
+  MoverReach unknown(reach_camera(), person_before_wall(), kReachM);
   unknown.add(kTorso, cv::Mat(kTorso.size(), CV_8UC1, cv::Scalar(255)), 0);
   unknown.spread();
   EXPECT_TRUE(std::isinf(unknown.distance_m({150, 80})));

@@ -19,7 +19,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kToMm = 1e3;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kWidth_px = 960, kTimeChartHeight_px = 210;
 constexpr std::size_t kFewestColumns = 2, kMostColumns = 3;  // of trajectories
@@ -50,7 +49,7 @@ Chart trajectory_panel(const DrawnRun& run, std::array<int, 2> plane) {
   const AbsoluteError& e = run.evaluation.absolute;
   constexpr const char* kAxes[] = {"x (m)", "y (m)", "z (m)"};
   Chart chart;
-  chart.title = fmt::format("{}: ATE RMSE {} mm", run.mode, three_digits(kToMm * e.statistics_m.rmse));
+  chart.title = fmt::format("{}: ATE RMSE {} mm", run.mode, three_digits(kMmPerM * e.statistics_m.rmse));
   chart.x_label = kAxes[plane[0]];
   chart.y_label = kAxes[plane[1]];
   chart.equal_aspect = true;
@@ -74,10 +73,10 @@ struct TimedError {
 };
 
 const TimedError kTimedErrors[] = {
-    {"absolute trajectory error", "mm", kToMm,
+    {"absolute trajectory error", "mm", kMmPerM,
      [](const Evaluation& e) -> const ErrorStatistics& { return e.absolute.statistics_m; },
      [](const Evaluation& e) -> const std::vector<double>& { return e.absolute.errors_m; }, false},
-    {"relative translation, by the start of the step", "mm", kToMm,
+    {"relative translation, by the start of the step", "mm", kMmPerM,
      [](const Evaluation& e) -> const ErrorStatistics& { return e.relative.translation_m; },
      [](const Evaluation& e) -> const std::vector<double>& { return e.relative.translation_errors_m; }, true},
     {"relative rotation, by the start of the step", "degrees", 1,
@@ -154,7 +153,7 @@ void add_published(std::span<const DrawnSystem> systems, BarChart& chart) {
       BarSeries series{std::string(name), colour, {}};
       for (const std::string& sequence : chart.groups) {
         const auto error = system.ate_rmse_m(sequence);
-        series.values.push_back(error ? kToMm * *error : kNan);
+        series.values.push_back(error ? kMmPerM * *error : kNan);
       }
       chart.series.push_back(std::move(series));
     }
@@ -215,14 +214,14 @@ std::vector<std::string> draw_error_bars(const BenchResults& results) {
   const auto add = [&](const char* number, const std::string& title, const char* unit, double scale) {
     charts.push_back(error_bars(results, cells, number, title.c_str(), unit, scale));
   };
-  add("ate_rmse_m", "absolute trajectory error, RMSE", "mm", kToMm);
-  add("ate_sd_m", "absolute trajectory error, SD", "mm", kToMm);
-  add("rpe_translation_rmse_m", "relative translation" + step + "RMSE", "mm", kToMm);
-  add("rpe_translation_sd_m", "relative translation" + step + "SD", "mm", kToMm);
+  add("ate_rmse_m", "absolute trajectory error, RMSE", "mm", kMmPerM);
+  add("ate_sd_m", "absolute trajectory error, SD", "mm", kMmPerM);
+  add("rpe_translation_rmse_m", "relative translation" + step + "RMSE", "mm", kMmPerM);
+  add("rpe_translation_sd_m", "relative translation" + step + "SD", "mm", kMmPerM);
   add("rpe_rotation_rmse_deg", "relative rotation" + step + "RMSE", "degrees", 1);
   add("rpe_rotation_sd_deg", "relative rotation" + step + "SD", "degrees", 1);
   if (const auto systems = drawn_systems(results); !systems.empty()) {
-    add("ate_rmse_m", "absolute trajectory error, RMSE; grey: published, other machines", "mm", kToMm);
+    add("ate_rmse_m", "absolute trajectory error, RMSE; grey: published, other machines", "mm", kMmPerM);
     add_published(systems, charts.back());
   }
   std::vector<std::string> out;

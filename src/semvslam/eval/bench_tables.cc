@@ -9,7 +9,7 @@
 namespace semvslam {
 namespace {
 
-constexpr double kToMm = 1e3, kToPercent = 100;
+constexpr double kToPercent = 100;
 constexpr const char* kOthers = "published, other machine";
 constexpr const char* kSources =
     " Published: the Sem-VSLAM paper, Tables VI and VII, which takes the errors from the systems' own papers; NGD-SLAM "
@@ -71,9 +71,9 @@ std::vector<Table> error_tables(const BenchResults& results, const std::vector<B
   const std::string rotation =
       fmt::format("Relative pose error over {}, rotation, degrees (as the paper's Table V)", results.rpe_delta);
   const ErrorKind kinds[] = {{"Absolute trajectory error, mm (as the paper's Table III)", "ate_rmse_m", "ate_mean_m",
-                              "ate_median_m", "ate_sd_m", kToMm},
+                              "ate_median_m", "ate_sd_m", kMmPerM},
                              {translation.c_str(), "rpe_translation_rmse_m", "rpe_translation_mean_m",
-                              "rpe_translation_median_m", "rpe_translation_sd_m", kToMm},
+                              "rpe_translation_median_m", "rpe_translation_sd_m", kMmPerM},
                              {rotation.c_str(), "rpe_rotation_rmse_deg", "rpe_rotation_mean_deg",
                               "rpe_rotation_median_deg", "rpe_rotation_sd_deg", 1}};
   std::vector<Table> out;
@@ -92,7 +92,7 @@ std::vector<Table> error_tables(const BenchResults& results, const std::vector<B
 std::string across_cell(const BenchCell* cell) {
   if (cell == nullptr || cell->over("ate_rmse_m").count == 0) return "";
   const double share = cell->over("tracked_share").median;
-  const std::string error = three_digits(kToMm * cell->over("ate_rmse_m").median);
+  const std::string error = three_digits(kMmPerM * cell->over("ate_rmse_m").median);
   return share > 0.9995 ? error : fmt::format("{} [{:.1f} %]", error, kToPercent * share);
 }
 
@@ -108,7 +108,7 @@ void add_published_errors(const BenchResults& results, Table& table) {
     bool any = false;
     for (const std::string& sequence : results.sequences) {
       const auto error = system.ate_rmse_m(sequence);
-      row.push_back(error ? three_digits(kToMm * *error) : "");
+      row.push_back(error ? three_digits(kMmPerM * *error) : "");
       any = any || error;
     }
     if (any) table.rows.push_back(std::move(row));
@@ -210,8 +210,8 @@ Table published_relative_table(const BenchResults& results) {
     if (const auto known = paper_sequence(sequence))
       for (const PublishedRelativeError& p : published_relative_errors()) {
         const auto& v = p.values.at(static_cast<std::size_t>(*known));
-        table.rows.push_back({sequence, std::string(p.system), three_digits(kToMm * v.translation_rmse_m),
-                              three_digits(kToMm * v.translation_sd_m), three_digits(v.rotation_rmse_deg),
+        table.rows.push_back({sequence, std::string(p.system), three_digits(kMmPerM * v.translation_rmse_m),
+                              three_digits(kMmPerM * v.translation_sd_m), three_digits(v.rotation_rmse_deg),
                               three_digits(v.rotation_sd_deg)});
       }
   return table;
@@ -247,7 +247,7 @@ Table summary_table(const BenchResults& results) {
   for (const BenchCell& cell : cells_of(results)) {
     const auto spread = [&](const char* name, double scale = 1) { return format_spread(cell.over(name), scale); };
     table.rows.push_back({cell.sequence, cell.mode, std::to_string(cell.good.size() + cell.failed.size()),
-                          std::to_string(cell.failed.size()), spread("ate_rmse_m", kToMm), tracked(cell),
+                          std::to_string(cell.failed.size()), spread("ate_rmse_m", kMmPerM), tracked(cell),
                           format_counts(cell.over("lost")), spread("tracking_mean_ms"), spread("tracking_p95_ms"),
                           spread("frames_per_s"), spread("cpu_ms_per_frame"), spread("peak_memory_mb")});
   }

@@ -23,6 +23,9 @@ std::string to_html(const Table& table);
 /// "-" for what is not finite.
 std::string three_digits(double value);
 
+/// Tables and figures show lengths in millimetres.
+inline constexpr double kMmPerM = 1e3;
+
 /// "6.20 (5.80-6.40)": median and range, times `scale`; the median alone where all are equal as written, nothing
 /// without a value.
 std::string format_spread(const Spread& spread, double scale = 1);

@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kDegPerRad = 57.295779513082321;
 
-Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
-
 std::vector<RelativeError::Step> steps_in_frames(std::size_t count, std::size_t delta, bool overlapping) {
   std::vector<RelativeError::Step> steps;
   for (std::size_t from = 0; from + delta < count; from += overlapping ? 1 : delta)
@@ -47,7 +45,7 @@ std::vector<RelativeError::Step> steps_in_seconds(const Trajectory& estimate, co
 Result<AbsoluteError> absolute_error(const Trajectory& reference, const Trajectory& estimate,
                                      const std::vector<PosePair>& pairs, bool with_scale) {
   if (pairs.size() < 3)
-    return invalid(fmt::format("only {} poses could be paired by time; an alignment needs 3", pairs.size()));
+    return invalid_input(fmt::format("only {} poses could be paired by time; an alignment needs 3", pairs.size()));
   std::vector<Eigen::Vector3d> from, to;
   for (const PosePair& pair : pairs) {
     from.push_back(estimate[pair.estimate].world_from_camera.translation());
@@ -73,7 +71,7 @@ AbsoluteError absolute_error(const Trajectory& reference, const Trajectory& esti
 }
 
 Result<Delta> Delta::parse(std::string_view text) {
-  const Error bad = invalid(
+  const Error bad = invalid_input(
       fmt::format("a delta is a number with s (seconds) or f (frames), like 1s or 30f; got '{}'", text.substr(0, 40)));
   if (text.size() < 2 || (text.back() != 's' && text.back() != 'f')) return bad;
   Delta delta;
@@ -94,8 +92,8 @@ Result<RelativeError> relative_error(const Trajectory& reference, const Trajecto
                   ? steps_in_frames(pairs.size(), static_cast<std::size_t>(options.delta.amount), options.overlapping)
                   : steps_in_seconds(estimate, pairs, options.delta.amount, options.overlapping);
   if (out.steps.empty())
-    return invalid(fmt::format("no two of the {} paired poses are {} apart; choose a smaller delta", pairs.size(),
-                               options.delta.text()));
+    return invalid_input(fmt::format("no two of the {} paired poses are {} apart; choose a smaller delta", pairs.size(),
+                                     options.delta.text()));
   const auto true_pose = [&](std::size_t k) -> const SE3& { return reference[pairs[k].reference].world_from_camera; };
   const auto estimated_pose = [&](std::size_t k) {
     const SE3& pose = estimate[pairs[k].estimate].world_from_camera;

@@ -8,7 +8,7 @@
 namespace semvslam {
 namespace {
 
-Error refuse(const std::string& why) { return {ErrorCode::kInvalidInput, "align points: " + why}; }
+Error no_alignment(const std::string& why) { return {ErrorCode::kInvalidInput, "align points: " + why}; }
 
 Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -20,10 +20,10 @@ Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points) {
 
 Result<Alignment> align_points(std::span<const Eigen::Vector3d> a, std::span<const Eigen::Vector3d> b,
                                bool with_scale) {
-  if (a.size() != b.size()) return refuse(fmt::format("{} and {} points cannot be paired", a.size(), b.size()));
-  if (a.size() < 3) return refuse(fmt::format("at least 3 pairs are needed, got {}", a.size()));
+  if (a.size() != b.size()) return no_alignment(fmt::format("{} and {} points cannot be paired", a.size(), b.size()));
+  if (a.size() < 3) return no_alignment(fmt::format("at least 3 pairs are needed, got {}", a.size()));
   for (std::size_t i = 0; i < a.size(); ++i)
-    if (!a[i].allFinite() || !b[i].allFinite()) return refuse(fmt::format("pair {} is not finite", i));
+    if (!a[i].allFinite() || !b[i].allFinite()) return no_alignment(fmt::format("pair {} is not finite", i));
 
   const double n = static_cast<double>(a.size());
   const Eigen::Vector3d mean_a = mean_of(a), mean_b = mean_of(b);
@@ -39,7 +39,7 @@ Result<Alignment> align_points(std::span<const Eigen::Vector3d> a, std::span<con
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d d = svd.singularValues();
   // A second singular value within rounding of zero leaves the rotation about the line free.
-  if (!(d[0] > 1e-18) || !(d[1] > 1e-14 * d[0])) return refuse("the points lie on one line or in one place");
+  if (!(d[0] > 1e-18) || !(d[1] > 1e-14 * d[0])) return no_alignment("the points lie on one line or in one place");
   Eigen::Vector3d sign = Eigen::Vector3d::Ones();
   if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0) sign.z() = -1;
 

@@ -18,7 +18,7 @@ using Matrix9 = Eigen::Matrix<double, 9, 9>;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSmallestShare = 1e-10;  // of the second smallest eigenvalue: below, the solution is not unique
 
-Error refuse(const std::string& why) { return {ErrorCode::kInvalidInput, "fundamental matrix: " + why}; }
+Error no_matrix(const std::string& why) { return {ErrorCode::kInvalidInput, "fundamental matrix: " + why}; }
 
 Eigen::Matrix3d inverse_intrinsics(const Camera& c) {
   Eigen::Matrix3d k;
@@ -92,16 +92,16 @@ Eigen::Matrix3d fundamental_from_pose(const Camera& camera_a, const Camera& came
 Result<Eigen::Matrix3d> fundamental_eight_point(std::span<const Eigen::Vector2d> pixels_a,
                                                 std::span<const Eigen::Vector2d> pixels_b) {
   if (pixels_a.size() != pixels_b.size())
-    return refuse(fmt::format("{} and {} pixels cannot be paired", pixels_a.size(), pixels_b.size()));
-  if (pixels_a.size() < 8) return refuse(fmt::format("at least 8 pairs are needed, got {}", pixels_a.size()));
+    return no_matrix(fmt::format("{} and {} pixels cannot be paired", pixels_a.size(), pixels_b.size()));
+  if (pixels_a.size() < 8) return no_matrix(fmt::format("at least 8 pairs are needed, got {}", pixels_a.size()));
   for (std::size_t i = 0; i < pixels_a.size(); ++i)
-    if (!pixels_a[i].allFinite() || !pixels_b[i].allFinite()) return refuse(fmt::format("pair {} is not finite", i));
+    if (!pixels_a[i].allFinite() || !pixels_b[i].allFinite()) return no_matrix(fmt::format("pair {} is not finite", i));
   const Normalization normal_a(pixels_a), normal_b(pixels_b);
-  if (!(normal_a.scale > 0) || !(normal_b.scale > 0)) return refuse("all pixels are in one place");
+  if (!(normal_a.scale > 0) || !(normal_b.scale > 0)) return no_matrix("all pixels are in one place");
 
   const std::optional<Vector9> solution = pixels_a.size() == 8 ? exact_solution(pixels_a, pixels_b, normal_a, normal_b)
                                                                : least_squares(pixels_a, pixels_b, normal_a, normal_b);
-  if (!solution) return refuse("the pairs allow many solutions (one line, one plane or no parallax)");
+  if (!solution) return no_matrix("the pairs allow many solutions (one line, one plane or no parallax)");
   const Vector9& f = *solution;
   Eigen::Matrix3d m;
   m << f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8];

@@ -9,7 +9,7 @@
 namespace semvslam {
 namespace {
 
-constexpr double kDriftRad = 0.25;  // 125 px after a turn: far beyond any window around where the camera should be
+constexpr double kLoopDriftRad = 0.25;  // 125 px after a turn: far beyond any window around where the camera should be
 
 class LoopTest : public testing::Test, protected testing_support::DriftingMap {
  protected:
@@ -36,17 +36,17 @@ class LoopTest : public testing::Test, protected testing_support::DriftingMap {
 };
 
 TEST_F(LoopTest, APlaceIsRecognisedHoweverFarTheMapHasDrifted) {
-  const int at = go_around(kDriftRad);
+  const int at = go_around(kLoopDriftRad);
   ASSERT_GE(at, kTurn - 8) << "the first images' edge comes into view";
   EXPECT_GE(loop->matches.size(), 40u);
   EXPECT_GT(loop->shift_px, 50);
   EXPECT_FALSE(find_revisit(map, newest, {})) << "too far for a search around the pose";
   // The earlier visit has drifted by little, so its landmarks tell the true pose.
-  EXPECT_LT((loop->camera_from_world * truth(at).inverse()).log().norm(), 0.15 * kDriftRad);
+  EXPECT_LT((loop->camera_from_world * truth(at).inverse()).log().norm(), 0.15 * kLoopDriftRad);
 }
 
 TEST_F(LoopTest, ClosingItTakesTheDriftAway) {
-  ASSERT_GE(go_around(kDriftRad), 0);
+  ASSERT_GE(go_around(kLoopDriftRad), 0);
   const double before = worst_error_m();
   ASSERT_TRUE(close_revisit(map, newest, *loop));
   const Status status = map.check_invariants();
@@ -55,7 +55,7 @@ TEST_F(LoopTest, ClosingItTakesTheDriftAway) {
 }
 
 TEST_F(LoopTest, OneKeyFrameAloneDecidesNothing) {
-  const int at = go_around(kDriftRad);
+  const int at = go_around(kLoopDriftRad);
   ASSERT_GE(at, 0);
   finder = LoopFinder({});
   EXPECT_FALSE(finder.find(map, places, newest)) << "the first of a finder has none before it";
@@ -65,7 +65,7 @@ TEST_F(LoopTest, OneKeyFrameAloneDecidesNothing) {
 TEST_F(LoopTest, TwoThatDisagreeDecideNothing) {
   int first = -1;
   for (int i = 0; i <= kTurn && first < 0; ++i)
-    if (enter(i, kDriftRad)) first = i;
+    if (enter(i, kLoopDriftRad)) first = i;
   ASSERT_GE(first, 0);
   finder = LoopFinder({});
   EXPECT_FALSE(finder.find(map, places, newest));
@@ -80,11 +80,11 @@ TEST_F(LoopTest, WithoutDriftThereIsNothingToDo) { EXPECT_EQ(go_around(0), -1); 
 
 TEST_F(LoopTest, ACorrectionTooLargeForTheWayIsALookAlike) {
   finder = LoopFinder({.max_drift_share = 0, .drift_allowance_m = 0.1, .drift_allowance_deg = 180});
-  EXPECT_EQ(go_around(kDriftRad), -1);
+  EXPECT_EQ(go_around(kLoopDriftRad), -1);
 }
 
 TEST_F(LoopTest, AMovedThingIsNoPlace) {
-  for (int i = 0; i < kTurn - 12; ++i) (void)enter(i, kDriftRad);
+  for (int i = 0; i < kTurn - 12; ++i) (void)enter(i, kLoopDriftRad);
   // What the first key frames saw is painted over, but for a picture on the wall.
   for (std::size_t k = 0; k < room.corners.size(); ++k) {
     const Eigen::Vector3d& p = room.corners[k];
@@ -95,7 +95,7 @@ TEST_F(LoopTest, AMovedThingIsNoPlace) {
   finder = LoopFinder({.min_inliers = 20});
   bool taken_in = false;
   for (int i = kTurn - 12; i <= kTurn + 3; ++i) {
-    EXPECT_FALSE(enter(i, kDriftRad)) << i;
+    EXPECT_FALSE(enter(i, kLoopDriftRad)) << i;
     taken_in |= gullible.find(map, places, newest).has_value();
   }
   EXPECT_TRUE(taken_in) << "or the picture proves nothing";

@@ -24,11 +24,9 @@ constexpr std::int64_t kFirstStamp_ns = 1'000'000'000;
 constexpr double kFocalOfWidth = 525.0 / 640.0;  // as common RGB-D cameras: 62.7 degrees across
 constexpr int kBlurSteps = 6;
 
-Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
-
 Status check_choice(const char* option, const std::string& value, const std::vector<std::string>& choices) {
   if (std::find(choices.begin(), choices.end(), value) != choices.end()) return Status::success();
-  return invalid(fmt::format("scene option {}: '{}' is not one of {}", option, value, fmt::join(choices, ", ")));
+  return invalid_input(fmt::format("scene option {}: '{}' is not one of {}", option, value, fmt::join(choices, ", ")));
 }
 
 Camera make_camera(const SceneOptions& options) {
@@ -48,14 +46,15 @@ Status SceneOptions::check() const {
   if (Status s = check_choice("people", people, {"walking", "sitting", "none", "carrying"}); !s) return s;
   if (Status s = check_choice("motion", motion, {"xyz", "rpy", "halfsphere", "static", "tour"}); !s) return s;
   if (width_px < 16 || width_px > 8192 || height_px < 16 || height_px > 8192) {
-    return invalid(fmt::format("scene size {}x{}: both sides must be in 16..8192 pixels", width_px, height_px));
+    return invalid_input(fmt::format("scene size {}x{}: both sides must be in 16..8192 pixels", width_px, height_px));
   }
   if (frames < 1 || frames > 10'000'000)
-    return invalid(fmt::format("scene option frames: {} is not in 1..10000000", frames));
+    return invalid_input(fmt::format("scene option frames: {} is not in 1..10000000", frames));
   if (!(frame_rate_hz >= 0.1 && frame_rate_hz <= 1000)) {
-    return invalid(fmt::format("scene option frame_rate_hz: {} is not in 0.1..1000", frame_rate_hz));
+    return invalid_input(fmt::format("scene option frame_rate_hz: {} is not in 0.1..1000", frame_rate_hz));
   }
-  if (threads < 1 || threads > 256) return invalid(fmt::format("scene option threads: {} is not in 1..256", threads));
+  if (threads < 1 || threads > 256)
+    return invalid_input(fmt::format("scene option threads: {} is not in 1..256", threads));
   return Status::success();
 }
 

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-const fs::path kModels = fs::path(SEMVSLAM_SOURCE_DIR) / "models";
+const fs::path kShippedModels = fs::path(SEMVSLAM_SOURCE_DIR) / "models";
 
 class BadInput : public ::testing::TestWithParam<std::string> {
  protected:
@@ -26,10 +26,10 @@ class BadInput : public ::testing::TestWithParam<std::string> {
   void copy_model() const {
     for (const char* name :
          {"model.json", "trunk.onnx", "box.onnx", "mask.onnx", "refine.onnx", "trunk.int8.xml", "trunk.int8.bin"})
-      fs::copy_file(kModels / name, folder_ / name, fs::copy_options::overwrite_existing);
+      fs::copy_file(kShippedModels / name, folder_ / name, fs::copy_options::overwrite_existing);
   }
   void edit_model(const std::function<void(nlohmann::json&)>& edit) const {
-    std::ifstream in(kModels / "model.json");
+    std::ifstream in(kShippedModels / "model.json");
     nlohmann::json model = nlohmann::json::parse(in);
     edit(model);
     std::ofstream(folder_ / "model.json") << model.dump();

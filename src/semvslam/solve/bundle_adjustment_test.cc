@@ -13,8 +13,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 double worst_pose(const std::vector<SE3>& a, const std::vector<SE3>& b) {
   double worst = 0;
   for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, (a[i] * b[i].inverse()).log().norm());
@@ -152,9 +150,9 @@ TEST(BundleAdjustment, NanObservationsAndPointsAreLeftOut) {
   synthetic::Bundle b = synthetic::make_bundle(small());
   for (std::size_t i = 0; i < b.problem.edges.size(); i += 10) {
     PointObservation& ob = b.problem.edges[i].observation;
-    (i % 20 ? ob.pixel.y() : ob.disparity_px) = kNan;
+    (i % 20 ? ob.pixel.y() : ob.disparity_px) = synthetic::kNan;
   }
-  b.problem.points[7].x() = kNan;
+  b.problem.points[7].x() = synthetic::kNan;
   std::vector<std::uint8_t> inlier;
   ASSERT_TRUE(adjust_bundle(b.problem, {}, inlier).usable);
   EXPECT_LT(worst_pose(b.problem.poses, b.true_poses), 0.006);
@@ -212,7 +210,7 @@ TEST(BundleAdjustment, RefusesWhatCannotBeAdjusted) {
   EXPECT_FALSE(adjust_bundle(floating, {}, inlier).usable);
   EXPECT_EQ(floating.points, good.problem.points);
   BaProblem nan_pose = good.problem;
-  nan_pose.poses[3] = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, kNan, 0));
+  nan_pose.poses[3] = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, synthetic::kNan, 0));
   EXPECT_FALSE(adjust_bundle(nan_pose, {}, inlier).usable);
   BaProblem no_edges = good.problem;
   no_edges.edges.clear();

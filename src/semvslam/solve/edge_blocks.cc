@@ -6,9 +6,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kBehindCameraCost =
-    1e4;  // of an active edge whose point goes behind the camera: no step may gain by it
-
 struct Robust {
   Lanes weight, cost;
 };

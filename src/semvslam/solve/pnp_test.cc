@@ -12,8 +12,6 @@
 namespace semvslam {
 namespace {
 
-double error(const SE3& a, const SE3& b) { return (a * b.inverse()).log().norm(); }
-
 using Triple = std::array<Eigen::Vector3d, 3>;
 
 TEST(P3p, FindsTheTruePoseAmongItsSolutions) {
@@ -34,7 +32,7 @@ TEST(P3p, FindsTheTruePoseAmongItsSolutions) {
     solve_p3p(directions, points, solutions);
     double best = 1;
     for (const SE3& s : solutions) {
-      best = std::min(best, error(s, truth));
+      best = std::min(best, synthetic::pose_error(s, truth));
       for (std::size_t i = 0; i < 3; ++i) EXPECT_LT(((s * points[i]).normalized() - directions[i]).norm(), 1e-6);
     }
     found += best < 1e-5;
@@ -55,7 +53,7 @@ TEST(P3p, SymmetricPyramid) {
   std::vector<SE3> solutions;
   solve_p3p(directions, points, solutions);
   double best = 1;
-  for (const SE3& s : solutions) best = std::min(best, error(s, SE3()));
+  for (const SE3& s : solutions) best = std::min(best, synthetic::pose_error(s, SE3()));
   EXPECT_LT(best, 1e-6);
 }
 
@@ -81,13 +79,11 @@ synthetic::View view(double outliers, double depth_share = 0.8) {
   return synthetic::make_view(o);
 }
 
-const Intrinsics kCamera = Intrinsics::of(synthetic::vga_camera());
-
 TEST(Pnp, FindsThePoseAmongSixtyPercentOutliers) {
   const synthetic::View v = view(0.6);
-  const auto r = estimate_pose(kCamera, v.points, v.observations);
+  const auto r = estimate_pose(synthetic::kVga, v.points, v.observations);
   ASSERT_TRUE(r.ok());
-  EXPECT_LT(error(r->pose.camera_from_world, v.truth), 0.01);
+  EXPECT_LT(synthetic::pose_error(r->pose.camera_from_world, v.truth), 0.01);
   int wrong = 0, lost = 0;
   for (std::size_t i = 0; i < v.points.size(); ++i) {
     wrong += r->inlier[i] && v.is_outlier[i];
@@ -99,14 +95,15 @@ TEST(Pnp, FindsThePoseAmongSixtyPercentOutliers) {
 
 TEST(Pnp, NeedsNoDepth) {
   const synthetic::View v = view(0.3, 0);
-  const auto r = estimate_pose(kCamera, v.points, v.observations);
+  const auto r = estimate_pose(synthetic::kVga, v.points, v.observations);
   ASSERT_TRUE(r.ok());
-  EXPECT_LT(error(r->pose.camera_from_world, v.truth), 0.02);
+  EXPECT_LT(synthetic::pose_error(r->pose.camera_from_world, v.truth), 0.02);
 }
 
 TEST(Pnp, SameSeedSameBytes) {
   const synthetic::View v = view(0.5);
-  const auto a = estimate_pose(kCamera, v.points, v.observations), b = estimate_pose(kCamera, v.points, v.observations);
+  const auto a = estimate_pose(synthetic::kVga, v.points, v.observations),
+             b = estimate_pose(synthetic::kVga, v.points, v.observations);
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a->pose.camera_from_world.translation(), b->pose.camera_from_world.translation());
   EXPECT_EQ(a->iterations, b->iterations);
@@ -114,10 +111,10 @@ TEST(Pnp, SameSeedSameBytes) {
 
 TEST(Pnp, RefusesWhatHasNoPose) {
   const synthetic::View v = view(1.0);
-  const auto garbage = estimate_pose(kCamera, v.points, v.observations);
+  const auto garbage = estimate_pose(synthetic::kVga, v.points, v.observations);
   ASSERT_FALSE(garbage.ok());
   EXPECT_NE(garbage.error().message.find("agree"), std::string::npos);
-  const auto few = estimate_pose(kCamera, std::span(v.points).first(3), std::span(v.observations).first(3));
+  const auto few = estimate_pose(synthetic::kVga, std::span(v.points).first(3), std::span(v.observations).first(3));
   ASSERT_FALSE(few.ok());
   EXPECT_NE(few.error().message.find("at least 4"), std::string::npos);
   EXPECT_FALSE(estimate_pose({}, v.points, v.observations).ok());
@@ -132,9 +129,9 @@ TEST(Pnp, NanMatchesAreLeftOut) {
       v.observations[i].pixel.y() = std::nan("");
     }
   }
-  const auto r = estimate_pose(kCamera, v.points, v.observations);
+  const auto r = estimate_pose(synthetic::kVga, v.points, v.observations);
   ASSERT_TRUE(r.ok());
-  EXPECT_LT(error(r->pose.camera_from_world, v.truth), 0.01);
+  EXPECT_LT(synthetic::pose_error(r->pose.camera_from_world, v.truth), 0.01);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Sparse = Eigen::SparseMatrix<double>;
 
-constexpr double kFirstLambda = 1e-6, kSmallestLambda = 1e-12, kLargestLambda = 1e8;
+constexpr double kFirstGraphLambda = 1e-6, kSmallestGraphLambda = 1e-12, kLargestGraphLambda = 1e8;
 
 class PoseGraph {
  public:
@@ -161,9 +161,9 @@ PoseGraphSummary optimize_pose_graph(PoseGraphProblem& problem, const PoseGraphO
   PoseGraph graph(problem, options);
   summary.usable = graph.usable();
   if (!summary.usable) return summary;
-  double cost = summary.initial_cost = graph.cost(graph.poses), lambda = kFirstLambda;
+  double cost = summary.initial_cost = graph.cost(graph.poses), lambda = kFirstGraphLambda;
   graph.linearize();
-  for (; summary.iterations < options.max_iterations && lambda < kLargestLambda; ++summary.iterations) {
+  for (; summary.iterations < options.max_iterations && lambda < kLargestGraphLambda; ++summary.iterations) {
     summary.stopped = stop.stop_requested();
     if (summary.stopped) break;
     if (!graph.solve(lambda)) {
@@ -181,7 +181,7 @@ PoseGraphSummary optimize_pose_graph(PoseGraphProblem& problem, const PoseGraphO
     graph.poses = std::move(candidate);
     cost = candidate_cost;
     ++summary.accepted_steps;
-    lambda = std::max(lambda * 0.1, kSmallestLambda);
+    lambda = std::max(lambda * 0.1, kSmallestGraphLambda);
     if (gain <= options.relative_cost_tolerance * cost) break;
     graph.linearize();
   }

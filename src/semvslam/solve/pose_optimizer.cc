@@ -14,7 +14,6 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr int kMinObservations = 3;
-constexpr double kBehindCameraCost = 1e4;  // of an inlier that a step pushes behind the camera: no step may gain by it
 constexpr double kRelativeGainToGoOn = 1e-8;  // of the cost, predicted by the linear model
 constexpr double kSmallestPivot = 1e-12;      // of the normal matrix scaled to a unit diagonal
 

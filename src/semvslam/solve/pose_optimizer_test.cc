@@ -13,8 +13,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 struct Case {
   synthetic::View view;
   SE3 initial;
@@ -33,15 +31,13 @@ Case make(const synthetic::BundleOptions& o, double shift = 0.05) {
   return s;
 }
 
-double error(const SE3& a, const SE3& b) { return (a * b.inverse()).log().norm(); }
-
 TEST(PoseOptimizer, ExactDataGiveTheExactPose) {
   synthetic::BundleOptions o;
   o.points = 300;
   o.pixel_noise_px = o.disparity_noise_px = 0;
   Case s = make(o);
   const PoseEstimate e = s.run();
-  EXPECT_LT(error(e.camera_from_world, s.view.truth), 1e-8);
+  EXPECT_LT(synthetic::pose_error(e.camera_from_world, s.view.truth), 1e-8);
   EXPECT_EQ(e.inliers, static_cast<int>(s.view.points.size()));
 }
 
@@ -69,7 +65,7 @@ TEST(PoseOptimizer, FindsAThirdOfOutliersAndKeepsPixelsWithWrongDepth) {
   o.depth_outlier_share = 0.3;
   Case s = make(o, 0.03);
   const PoseEstimate e = s.run();
-  EXPECT_LT(error(e.camera_from_world, s.view.truth), 0.003);
+  EXPECT_LT(synthetic::pose_error(e.camera_from_world, s.view.truth), 0.003);
   int wrong = 0, wrong_depth = 0, kept_pixels = 0;
   for (std::size_t i = 0; i < s.inlier.size(); ++i) {
     wrong += s.inlier[i] && s.view.is_outlier[i];
@@ -116,7 +112,7 @@ TEST(PoseOptimizer, WorksWithoutAnyDepth) {
   o.points = 200;
   o.depth_share = 0;
   Case s = make(o);
-  EXPECT_LT(error(s.run().camera_from_world, s.view.truth), 0.01);
+  EXPECT_LT(synthetic::pose_error(s.run().camera_from_world, s.view.truth), 0.01);
 }
 
 TEST(PoseOptimizer, NanNeverReachesThePose) {
@@ -126,21 +122,21 @@ TEST(PoseOptimizer, NanNeverReachesThePose) {
   for (std::size_t i = 0; i < s.view.points.size(); i += 4) {
     switch (i / 4 % 4) {
       case 0:
-        s.view.points[i].y() = kNan;
+        s.view.points[i].y() = synthetic::kNan;
         break;
       case 1:
-        s.view.observations[i].pixel.x() = kNan;
+        s.view.observations[i].pixel.x() = synthetic::kNan;
         break;
       case 2:
-        s.view.observations[i].inverse_variance_px = kNan;
+        s.view.observations[i].inverse_variance_px = synthetic::kNan;
         break;
       default:
-        s.view.observations[i].disparity_px = kNan;
+        s.view.observations[i].disparity_px = synthetic::kNan;
         break;
     }
   }
   const PoseEstimate e = s.run();
-  EXPECT_LT(error(e.camera_from_world, s.view.truth), 0.01);
+  EXPECT_LT(synthetic::pose_error(e.camera_from_world, s.view.truth), 0.01);
   EXPECT_EQ(s.inlier[0], 0);
   EXPECT_EQ(s.inlier[4], 0);
   EXPECT_EQ(s.inlier[8], 0);
@@ -152,7 +148,7 @@ void expect_refused(Case s) {
   EXPECT_EQ(std::count(s.inlier.begin(), s.inlier.end(), 1), 0);
   EXPECT_EQ(s.inlier.size(), s.view.points.size());
   if (s.initial.is_finite()) {
-    EXPECT_LT(error(e.camera_from_world, s.initial), 1e-15);
+    EXPECT_LT(synthetic::pose_error(e.camera_from_world, s.initial), 1e-15);
   }
 }
 
@@ -178,7 +174,7 @@ TEST(PoseOptimizer, RefusesTooFewAndDegenerateObservations) {
   for (auto& p : behind.view.points) p = behind.initial.inverse() * -(behind.initial * p);
   expect_refused(behind);
   Case nan_start = good;
-  nan_start.initial = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(kNan, 0, 0));
+  nan_start.initial = SE3(Eigen::Quaterniond::Identity(), Eigen::Vector3d(synthetic::kNan, 0, 0));
   expect_refused(nan_start);
 }
 
@@ -208,7 +204,7 @@ TEST(PoseOptimizer, ThreePointsWithDepthAreEnough) {
   s.view.observations.resize(3);
   const PoseEstimate e = s.run();
   EXPECT_EQ(e.inliers, 3);
-  EXPECT_LT(error(e.camera_from_world, s.view.truth), 1e-6);
+  EXPECT_LT(synthetic::pose_error(e.camera_from_world, s.view.truth), 1e-6);
 }
 
 TEST(PoseOptimizer, ThrowsWhenTheArraysDiffer) {

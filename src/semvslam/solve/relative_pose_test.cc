@@ -10,7 +10,6 @@
 namespace semvslam {
 namespace {
 
-const Intrinsics kCamera = Intrinsics::of(synthetic::vga_camera());
 const SE3 kTruth(Eigen::Quaterniond(0.98, 0.05, -0.15, 0.1), Eigen::Vector3d(0.4, -0.1, 0.2));
 
 struct Matches {
@@ -27,12 +26,13 @@ Matches make(int n, double outliers) {
     const Eigen::Vector3d a = kTruth * b;
     const auto see = [&](const Eigen::Vector3d& p, Eigen::Vector3d& point) {
       PointObservation o;
-      o.pixel = {kCamera.fx_px * p.x() / p.z() + kCamera.cx_px + random.normal(0, 0.5),
-                 kCamera.fy_px * p.y() / p.z() + kCamera.cy_px + random.normal(0, 0.5)};
-      o.disparity_px = kCamera.focal_baseline_px_m / p.z() + random.normal(0, 0.2);
+      o.pixel = {synthetic::kVga.fx_px * p.x() / p.z() + synthetic::kVga.cx_px + random.normal(0, 0.5),
+                 synthetic::kVga.fy_px * p.y() / p.z() + synthetic::kVga.cy_px + random.normal(0, 0.5)};
+      o.disparity_px = synthetic::kVga.focal_baseline_px_m / p.z() + random.normal(0, 0.2);
       o.inverse_variance_px = 1;
-      const double z = kCamera.focal_baseline_px_m / o.disparity_px;
-      point = {(o.pixel.x() - kCamera.cx_px) / kCamera.fx_px * z, (o.pixel.y() - kCamera.cy_px) / kCamera.fy_px * z, z};
+      const double z = synthetic::kVga.focal_baseline_px_m / o.disparity_px;
+      point = {(o.pixel.x() - synthetic::kVga.cx_px) / synthetic::kVga.fx_px * z,
+               (o.pixel.y() - synthetic::kVga.cy_px) / synthetic::kVga.fy_px * z, z};
       return o;
     };
     MatchedPoint m;
@@ -50,7 +50,7 @@ double error(const SE3& a) { return (a * kTruth.inverse()).log().norm(); }
 
 TEST(RelativePose, FindsTheMotionAmongHalfOutliers) {
   const Matches m = make(120, 0.5);
-  const auto r = estimate_relative_pose(kCamera, m.points);
+  const auto r = estimate_relative_pose(synthetic::kVga, m.points);
   ASSERT_TRUE(r.ok());
   EXPECT_LT(error(r->a_from_b), 0.02);
   int wrong = 0, kept = 0, right = 0;
@@ -66,7 +66,8 @@ TEST(RelativePose, FindsTheMotionAmongHalfOutliers) {
 
 TEST(RelativePose, SameSeedSameBytes) {
   const Matches m = make(80, 0.4);
-  const auto a = estimate_relative_pose(kCamera, m.points), b = estimate_relative_pose(kCamera, m.points);
+  const auto a = estimate_relative_pose(synthetic::kVga, m.points),
+             b = estimate_relative_pose(synthetic::kVga, m.points);
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a->a_from_b.translation(), b->a_from_b.translation());
   EXPECT_EQ(a->inlier, b->inlier);
@@ -74,20 +75,20 @@ TEST(RelativePose, SameSeedSameBytes) {
 
 TEST(RelativePose, RefusesGarbageAndTooFew) {
   const Matches garbage = make(80, 1.0);
-  EXPECT_FALSE(estimate_relative_pose(kCamera, garbage.points).ok());
+  EXPECT_FALSE(estimate_relative_pose(synthetic::kVga, garbage.points).ok());
   const Matches few = make(2, 0);
-  const auto r = estimate_relative_pose(kCamera, few.points);
+  const auto r = estimate_relative_pose(synthetic::kVga, few.points);
   ASSERT_FALSE(r.ok());
   EXPECT_NE(r.error().message.find("at least 3"), std::string::npos);
   EXPECT_FALSE(estimate_relative_pose({}, make(50, 0).points).ok());
   std::vector<MatchedPoint> one_place(50, make(1, 0).points[0]);
-  EXPECT_FALSE(estimate_relative_pose(kCamera, one_place).ok());
+  EXPECT_FALSE(estimate_relative_pose(synthetic::kVga, one_place).ok());
 }
 
 TEST(RelativePose, NanMatchesAreLeftOut) {
   Matches m = make(60, 0);
   for (std::size_t i = 0; i < 60; i += 3) m.points[i].in_a.z() = std::nan("");
-  const auto r = estimate_relative_pose(kCamera, m.points);
+  const auto r = estimate_relative_pose(synthetic::kVga, m.points);
   ASSERT_TRUE(r.ok());
   EXPECT_LT(error(r->a_from_b), 0.02);
   for (std::size_t i = 0; i < 60; i += 3) EXPECT_EQ(r->inlier[i], 0);

@@ -14,6 +14,8 @@ namespace semvslam {
 
 /// Points closer to the image plane than this (or behind it) cannot be seen: their residuals do not exist.
 inline constexpr double kMinDepthM = 1e-3;
+/// Cost of a measurement whose point a step pushes behind the camera: no step may gain by it.
+inline constexpr double kBehindCameraCost = 1e4;
 
 /// Residuals (measured - predicted) of one observation, px, and the entries of d(prediction)/d(point in the camera
 /// frame) that are not identically zero. Needs z > 0.

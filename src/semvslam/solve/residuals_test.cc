@@ -12,8 +12,6 @@ namespace semvslam {
 namespace {
 
 using Vector6 = SE3::Tangent;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 const SE3 kPose(Eigen::Quaterniond(0.9, 0.1, -0.2, 0.3), Eigen::Vector3d(0.3, -0.2, 0.5));
 
 PointObservation observation(double u, double v, double disparity) {
@@ -93,7 +91,7 @@ INSTANTIATE_TEST_SUITE_P(Points, ResidualDerivative,
 
 TEST(Residuals, NothingBehindTheCamera) {
   const Intrinsics camera = Intrinsics::of(synthetic::vga_camera());
-  for (const double z : {0.0, -1.0, kMinDepthM, kNan}) {
+  for (const double z : {0.0, -1.0, kMinDepthM, synthetic::kNan}) {
     const DenseResidual r = dense_residual(camera, SE3(), {0.1, 0.1, z}, observation(1, 1, 1));
     EXPECT_FALSE(r.valid) << z;
     EXPECT_EQ(r.by_pose.norm(), 0);
@@ -102,7 +100,7 @@ TEST(Residuals, NothingBehindTheCamera) {
 
 TEST(Residuals, WithoutDepthTheDisparityRowIsZero) {
   const Intrinsics camera = Intrinsics::of(synthetic::vga_camera());
-  for (const double disparity : {-1.0, 0.0, kNan}) {
+  for (const double disparity : {-1.0, 0.0, synthetic::kNan}) {
     const DenseResidual r =
         dense_residual(camera, kPose, kPose.inverse() * Eigen::Vector3d(0, 0, 2), observation(1, 1, disparity));
     ASSERT_TRUE(r.valid);
@@ -124,8 +122,8 @@ TEST(Residuals, HuberIsSmoothAtTheCornerAndItsWeightIsTheDerivative) {
 
 TEST(Residuals, RecognisesUsableObservations) {
   EXPECT_TRUE(is_usable(observation(1, 2, -1)));
-  EXPECT_FALSE(is_usable(observation(kNan, 2, 1)));
-  EXPECT_FALSE(has_depth(observation(1, 2, kNan)));
+  EXPECT_FALSE(is_usable(observation(synthetic::kNan, 2, 1)));
+  EXPECT_FALSE(has_depth(observation(1, 2, synthetic::kNan)));
   EXPECT_FALSE(has_depth(observation(1, 2, 0)));
   PointObservation o = observation(1, 2, 3);
   EXPECT_TRUE(has_depth(o));
@@ -137,7 +135,7 @@ TEST(Residuals, RecognisesUsableObservations) {
   EXPECT_FALSE(has_depth(observation(1, 2, 1e200)));
   EXPECT_TRUE(is_usable(Eigen::Vector3d(1, -1e6, 3)));
   EXPECT_FALSE(is_usable(Eigen::Vector3d(1, -1e200, 3)));
-  EXPECT_FALSE(is_usable(Eigen::Vector3d(1, kNan, 3)));
+  EXPECT_FALSE(is_usable(Eigen::Vector3d(1, synthetic::kNan, 3)));
 }
 
 }  // namespace

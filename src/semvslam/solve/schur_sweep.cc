@@ -6,7 +6,7 @@
 namespace semvslam {
 namespace {
 
-constexpr double kSmallestPivot = 1e-14;  // of a point's block, relative to its diagonal
+constexpr double kSmallestPointPivot = 1e-14;  // of a point's block, relative to its diagonal
 
 // Position of the diagonal in the packed upper triangles.
 constexpr std::array<std::size_t, 6> kPoseDiagonal{0, 6, 11, 15, 18, 20};
@@ -64,11 +64,11 @@ void SchurSweep::Factor::compute(const PointNormal& normal, double lambda) {
   l10 = normal[1] * inverse_l00;
   l20 = normal[2] * inverse_l00;
   const double d11 = d1 - l10 * l10;
-  if (!(d11 > kSmallestPivot * d1)) return;
+  if (!(d11 > kSmallestPointPivot * d1)) return;
   inverse_l11 = 1 / std::sqrt(d11);
   l21 = (normal[4] - l20 * l10) * inverse_l11;
   const double d22 = d2 - l20 * l20 - l21 * l21;
-  if (!(d22 > kSmallestPivot * d2)) return;
+  if (!(d22 > kSmallestPointPivot * d2)) return;
   inverse_l22 = 1 / std::sqrt(d22);
   y[0] = normal[6] * inverse_l00;
   y[1] = (normal[7] - l10 * y[0]) * inverse_l11;

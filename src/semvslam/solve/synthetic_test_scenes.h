@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -19,6 +20,12 @@ inline Camera vga_camera() {
   c.cy_px = 241;
   return c;
 }
+
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+inline const Intrinsics kVga = Intrinsics::of(vga_camera());
+
+/// Length of the twist between two poses.
+inline double pose_error(const SE3& a, const SE3& b) { return (a * b.inverse()).log().norm(); }
 
 struct BundleOptions {
   int poses = 24;
