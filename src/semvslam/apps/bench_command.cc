@@ -21,7 +21,7 @@ namespace {
 
 struct BenchArguments {
   std::vector<std::string> targets, assignments;
-  std::string data, out, modes, baseline;
+  std::string data, out, modes, baseline, camera, camera_preset;
   int runs = 0;                  // 0 = the suite's
   std::uint64_t max_frames = 0;  // 0 = the suite's
   bool deterministic = false, no_truth_masks = false, again = false, list = false, quiet = false;
@@ -93,6 +93,9 @@ Status apply_options(const BenchArguments& a, BenchSuite& suite) {
   if (a.max_frames > 0) suite.max_frames = a.max_frames;
   if (a.deterministic) suite.deterministic = true;
   if (a.no_truth_masks) suite.truth_masks = false;
+  if (!a.camera.empty() || !a.camera_preset.empty())
+    for (SuiteEntry& entry : suite.entries)
+      if (!entry.scene) entry.camera = {a.camera.empty() ? "" : fs::absolute(a.camera).string(), a.camera_preset};
   suite.assignments.insert(suite.assignments.end(), a.assignments.begin(), a.assignments.end());
   return suite.check();
 }
@@ -131,6 +134,9 @@ CommandHandler setup_bench(CLI::App& parser) {
   parser.add_option("--baseline", a->baseline, "mode that improvements refer to (orb, where it is run)");
   parser.add_option("--set", a->assignments, "one configuration value for all runs, key=value; may be repeated")
       ->allow_extra_args(false);
+  CLI::Option* camera = parser.add_option("--camera", a->camera, "camera YAML for all recordings");
+  parser.add_option("--camera-preset", a->camera_preset, "built-in camera for all recordings, e.g. tum_fr3")
+      ->excludes(camera);
   parser.add_option("--max-frames", a->max_frames, "stop every run after so many frames")
       ->check(CLI::Range(1, 1'000'000'000));
   parser.add_flag("--deterministic", a->deterministic, "deterministic runs");

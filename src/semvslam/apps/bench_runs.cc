@@ -60,12 +60,15 @@ bool has_true_masks(const fs::path& recording) {
   return false;
 }
 
-std::vector<std::string> arguments_of(const BenchSuite& suite, const fs::path& recording, const std::string& mode) {
-  std::vector<std::string> out = {"run", fs::absolute(recording).lexically_normal().string(), "--mode", mode,
+std::vector<std::string> arguments_of(const BenchSuite& suite, const BenchRecording& recording,
+                                      const std::string& mode) {
+  std::vector<std::string> out = {"run", fs::absolute(recording.folder).lexically_normal().string(), "--mode", mode,
                                   "--quiet"};
+  if (!recording.camera.file.empty()) out.insert(out.end(), {"--camera", recording.camera.file});
+  if (!recording.camera.preset.empty()) out.insert(out.end(), {"--camera-preset", recording.camera.preset});
   if (suite.deterministic) out.push_back("--deterministic");
   if (suite.max_frames > 0) out.insert(out.end(), {"--max-frames", std::to_string(suite.max_frames)});
-  if (suite.truth_masks && has_true_masks(recording)) out.insert(out.end(), {"--truth-masks", "mask"});
+  if (suite.truth_masks && has_true_masks(recording.folder)) out.insert(out.end(), {"--truth-masks", "mask"});
   for (const std::string& assignment : suite.assignments) out.insert(out.end(), {"--set", assignment});
   return out;
 }
@@ -105,8 +108,8 @@ std::vector<PlannedRun> plan_runs(const BenchSuite& suite, const std::vector<Ben
   for (std::size_t i = 0; i < recordings.size(); ++i)
     for (int number = 1; number <= suite.runs; ++number)
       for (const std::string& mode : recordings[i].modes)
-        plans.push_back({i, recordings[i].name, mode, number, arguments_of(suite, recordings[i].folder, mode),
-                         fmt::format("runs/{}/{}/{}", recordings[i].name, mode, number)});
+        plans.push_back({i, recordings[i].name, mode, number, arguments_of(suite, recordings[i], mode),
+                         recordings[i].camera.file, fmt::format("runs/{}/{}/{}", recordings[i].name, mode, number)});
   return plans;
 }
 
@@ -139,6 +142,7 @@ std::string BenchRunner::identity_of(const PlannedRun& plan, const fs::path& rec
   Fingerprint print;
   for (const char* name : kRecordingFiles)
     if (print.add_file(recording / name)) print.add(name);
+  if (!plan.camera_file.empty()) print.add_file(plan.camera_file);
   const Json json = {{"program", program_.identity}, {"arguments", plan.arguments}, {"recording", print.text()}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -19,6 +19,7 @@ struct PlannedRun {
   std::string sequence, mode;
   int number = 1;                      // of the repeats, from 1
   std::vector<std::string> arguments;  // of the program, all but --out
+  std::string camera_file;             // that the arguments name; empty = none
   std::string folder;                  // of its files, relative to the bench's: runs/SEQUENCE/MODE/NUMBER
 };
 

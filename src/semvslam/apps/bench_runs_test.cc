@@ -120,10 +120,25 @@ TEST_F(BenchRunnerTest, WhatChangesResultsMakesItRunAgain) {
   write_lists("0.2 rgb/b.png\n");
   perform(runner(false, "semvslam 2"), other);
   EXPECT_EQ(calls(), 5) << "another recording under the same name";
+  other.camera_file = (folder_ / "camera.yaml").string();
+  EXPECT_TRUE(write_file_atomically(other.camera_file, "fx: 500\n"));
+  perform(runner(false, "semvslam 2"), other);
+  EXPECT_TRUE(write_file_atomically(other.camera_file, "fx: 501\n"));
+  perform(runner(false, "semvslam 2"), other);
+  EXPECT_EQ(calls(), 7) << "another camera";
   fs::remove(folder_ / "bench/runs/walk/orb/1/stats.json");
   EXPECT_FALSE(perform(runner(false, "semvslam 2"), other).kept);
-  EXPECT_EQ(calls(), 6) << "its results are gone";
+  EXPECT_EQ(calls(), 8) << "its results are gone";
   EXPECT_TRUE(perform(runner(false, "semvslam 2"), other).kept);
+}
+
+TEST_F(BenchRunnerTest, AnotherCameraIsHandedOn) {
+  BenchSuite suite = suite_of_folders({recording().string()});
+  suite.entries[0].camera.file = "c.yaml";
+  const std::vector<PlannedRun> plans = plan_runs(suite, find_recordings(suite, folder_.path()).recordings);
+  const std::string file = (folder_ / "c.yaml").string();
+  EXPECT_THAT(plans.at(0).arguments, ::testing::IsSupersetOf({std::string("--camera"), file}));
+  EXPECT_EQ(plans.at(0).camera_file, file);
 }
 
 TEST_F(BenchRunnerTest, AFailureIsToldWithTheProgramsOwnWordsAndTriedAgain) {
@@ -162,8 +177,8 @@ TEST_F(BenchRunnerTest, AFolderThatCannotBeMadeEndsTheBench) {
 TEST(PlanRuns, ModesTakeTurns) {
   BenchSuite suite;
   suite.runs = 2;
-  const std::vector<BenchRecording> recordings = {{"a", "/x/a", {}, {"orb", "full"}, {}},
-                                                  {"b", "/x/b", {}, {"full"}, {}}};
+  const std::vector<BenchRecording> recordings = {{"a", "/x/a", {}, {"orb", "full"}, {}, {}},
+                                                  {"b", "/x/b", {}, {"full"}, {}, {}}};
   std::vector<std::string> folders;
   for (const PlannedRun& plan : plan_runs(suite, recordings)) folders.push_back(plan.folder);
   EXPECT_THAT(folders, ElementsAre("runs/a/orb/1", "runs/a/full/1", "runs/a/orb/2", "runs/a/full/2", "runs/b/full/1",
@@ -173,7 +188,7 @@ TEST(PlanRuns, ModesTakeTurns) {
 TEST(PlanRuns, ArgumentsFollowTheSuite) {
   const TemporaryFolder folder;
   BenchSuite suite;
-  const auto arguments = [&] { return plan_runs(suite, {{"a", folder.path(), {}, {"orb"}, {}}}).at(0).arguments; };
+  const auto arguments = [&] { return plan_runs(suite, {{"a", folder.path(), {}, {"orb"}, {}, {}}}).at(0).arguments; };
   const std::string path = folder.path().string();
   EXPECT_THAT(arguments(), ElementsAre("run", path, "--mode", "orb", "--quiet"));
   fs::create_directory(folder / "mask");

@@ -14,6 +14,7 @@
 #include "semvslam/base/config_schema.h"
 #include "semvslam/base/foreign_text.h"
 #include "semvslam/base/yaml_scalars.h"
+#include "semvslam/data/camera_file.h"
 #include "semvslam/pipeline/config.h"
 #include "semvslam/pipeline/presets.h"
 
@@ -25,7 +26,6 @@ namespace {
 constexpr double kNoLimit = -1;
 constexpr std::size_t kMostNameBytes = 100;
 
-Error invalid(std::string message) { return {ErrorCode::kInvalidInput, std::move(message)}; }
 Error at(const std::string& where, const Error& error) { return {error.code, where + ": " + error.message}; }
 
 /// Limits as they are written: numbers below zero are none.
@@ -55,12 +55,15 @@ struct EntryText {
   std::string scene_key;  // the first key that only a scene has; empty = none
   std::vector<std::string> modes;
   LimitsText limits;
+  CameraChoice camera;
 
   ConfigSchema schema() {
     ConfigSchema s;
     s.add("path", &path, {}, "folder of a recording, or a pattern for several");
     s.add("name", &name, {}, "in the tables");
     s.add("modes", &modes_text_, {}, "instead of the suite's");
+    s.add("camera", &camera.file, {}, "camera file instead of the recording's");
+    s.add("camera_preset", &camera.preset, {}, "built-in camera instead of the recording's");
     s.add("people", &people, {}, "of a rendered scene: walking, sitting, carrying or none");
     s.add("motion", &scene.motion, {}, "of the camera: xyz, rpy, halfsphere, static or tour");
     s.add("frames", &scene.frames, {1, 1e7}, "how many are rendered");
@@ -74,19 +77,24 @@ struct EntryText {
   }
 
   Result<SuiteEntry> entry() const {
-    SuiteEntry out{path, std::nullopt, name, modes, std::nullopt};
+    SuiteEntry out{path, std::nullopt, name, modes, std::nullopt, camera};
     if (limits.given) out.limits = limits.limits();
     if (path.empty() == people.empty())
-      return invalid(where + ": a sequence needs either 'path' or, to be rendered, 'people'");
+      return invalid_input(where + ": a sequence needs either 'path' or, to be rendered, 'people'");
     if (!path.empty() && !scene_key.empty())
-      return invalid(fmt::format("{}: '{}' is for rendered scenes and does not go with 'path'", where, scene_key));
+      return invalid_input(
+          fmt::format("{}: '{}' is for rendered scenes and does not go with 'path'", where, scene_key));
+    if (!camera.file.empty() && !camera.preset.empty())
+      return invalid_input(where + ": 'camera' and 'camera_preset' exclude each other");
     if (people.empty()) return out;
+    if (!camera.file.empty() || !camera.preset.empty())
+      return invalid_input(where + ": a rendered scene has a camera of its own: 'camera' goes with 'path'");
     out.scene = scene;
     out.scene->people = people;
     out.scene->seed = static_cast<std::uint64_t>(seed);
     out.scene->noise = !exact;
     if (!parse_size(size, out.scene->width_px, out.scene->height_px))
-      return invalid(fmt::format("{}: size is WIDTHxHEIGHT like 640x480, got {}", where, in_quotes(size)));
+      return invalid_input(fmt::format("{}: size is WIDTHxHEIGHT like 640x480, got {}", where, in_quotes(size)));
     if (const Status status = out.scene->check(); !status) return at(where, status.error());
     if (out.name.empty()) out.name = fmt::format("{}_{}{}", people, scene.motion, exact ? "_exact" : "");
     return out;
@@ -168,7 +176,7 @@ class SuiteText {
     if (!position.empty()) {
       const auto [end, code] = std::from_chars(position.data(), position.data() + position.size(), index);
       if (code != std::errc() || end != position.data() + position.size() || index > entries_.size())
-        return invalid(scalar.where + ": 'sequences' is a list: put '- ' before each of its entries");
+        return invalid_input(scalar.where + ": 'sequences' is a list: put '- ' before each of its entries");
     }
     if (index == entries_.size()) entries_.emplace_back().where = scalar.where;
     EntryText& entry = entries_[index];
@@ -209,7 +217,7 @@ class SuiteText {
 Status check_once(const std::vector<std::string>& modes) {
   std::set<std::string> seen;
   for (const std::string& mode : modes)
-    if (!seen.insert(mode).second) return invalid(fmt::format("mode {} is listed twice", in_quotes(mode)));
+    if (!seen.insert(mode).second) return invalid_input(fmt::format("mode {} is listed twice", in_quotes(mode)));
   return Status::success();
 }
 
@@ -261,15 +269,17 @@ void choose_baseline(BenchSuite& suite) {
 
 Status BenchSuite::check() const {
   if (!is_plain_name(name))
-    return invalid(fmt::format("{} cannot be a suite's name: it names a folder", in_quotes(name)));
-  if (entries.empty()) return invalid("no 'sequences': nothing to run");
-  if (modes.empty()) return invalid("no 'modes': nothing to run");
+    return invalid_input(fmt::format("{} cannot be a suite's name: it names a folder", in_quotes(name)));
+  if (entries.empty()) return invalid_input("no 'sequences': nothing to run");
+  if (modes.empty()) return invalid_input("no 'modes': nothing to run");
   std::set<std::string> known(modes.begin(), modes.end());
   if (Status status = check_once(modes); !status) return status;
   for (const SuiteEntry& entry : entries) {
     if (Status status = check_once(entry.modes); !status) return status;
     if (!entry.name.empty() && !is_plain_name(entry.name))
-      return invalid(fmt::format("{} cannot be a sequence's name: it names a folder", in_quotes(entry.name)));
+      return invalid_input(fmt::format("{} cannot be a sequence's name: it names a folder", in_quotes(entry.name)));
+    if (const std::string& preset = entry.camera.preset; !preset.empty())
+      if (const auto camera = camera_preset(preset); !camera) return camera.error();
     known.insert(entry.modes.begin(), entry.modes.end());
   }
   for (const std::string& mode : known) {
@@ -280,7 +290,7 @@ Status BenchSuite::check() const {
     if (const Status status = config.check(); !status) return at("mode " + mode, status.error());
   }
   if (!baseline.empty() && !known.contains(baseline))
-    return invalid(fmt::format("baseline {} is none of the modes", in_quotes(baseline)));
+    return invalid_input(fmt::format("baseline {} is none of the modes", in_quotes(baseline)));
   std::vector<const BenchLimits*> all = {&limits};
   for (const SuiteEntry& entry : entries)
     if (entry.limits) all.push_back(&*entry.limits);
@@ -303,7 +313,7 @@ BenchSuite suite_of_folders(const std::vector<std::string>& folders) {
   BenchSuite suite;
   suite.name = "recordings";
   suite.modes = {"orb", "full"};
-  for (const std::string& folder : folders) suite.entries.push_back({folder, std::nullopt, "", {}, std::nullopt});
+  for (const std::string& folder : folders) suite.entries.push_back({folder, std::nullopt, "", {}, std::nullopt, {}});
   return suite;
 }
 
@@ -313,8 +323,10 @@ FoundRecordings find_recordings(const BenchSuite& suite, const fs::path& base) {
   const auto add = [&](const SuiteEntry& entry, const fs::path& folder, const std::string& wanted) {
     std::string name = wanted;
     for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{}_{}", wanted, n);
+    CameraChoice camera = entry.camera;
+    if (!camera.file.empty()) camera.file = fs::absolute(base / camera.file).lexically_normal().string();
     out.recordings.push_back({name, folder, entry.scene, entry.modes.empty() ? suite.modes : entry.modes,
-                              entry.limits.value_or(suite.limits)});
+                              entry.limits.value_or(suite.limits), std::move(camera)});
   };
   for (const SuiteEntry& entry : suite.entries) {
     if (entry.scene) {

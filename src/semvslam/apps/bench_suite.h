@@ -14,6 +14,12 @@
 
 namespace semvslam {
 
+/// A camera other than the recording's own: at most one of the two.
+struct CameraChoice {
+  std::string file;    // camera YAML
+  std::string preset;  // a built-in camera's name
+};
+
 /// What a suite lists: recordings in folders, or a scene to be rendered.
 struct SuiteEntry {
   std::string path;  // of a folder, or a pattern (* ? [..]) for several; empty for a scene
@@ -21,6 +27,7 @@ struct SuiteEntry {
   std::string name;                   // in tables; empty = the folder's, or people_motion
   std::vector<std::string> modes;     // empty = the suite's
   std::optional<BenchLimits> limits;  // absent = the suite's
+  CameraChoice camera;                // of a recording
 };
 
 /// What `semvslam bench` runs. README, "Bench", shows the file that it is read from.
@@ -69,6 +76,7 @@ struct BenchRecording {
   std::optional<SceneOptions> scene;
   std::vector<std::string> modes;
   BenchLimits limits;
+  CameraChoice camera;
 };
 
 struct FoundRecordings {
@@ -76,7 +84,7 @@ struct FoundRecordings {
   std::vector<std::string> missing;  // paths that are no folder, patterns that match none
 };
 
-/// Looks up the suite's folders. @param base what relative paths start from
+/// Looks up the suite's folders. @param base what relative paths start from, of camera files too
 FoundRecordings find_recordings(const BenchSuite& suite, const std::filesystem::path& base);
 
 /// Whether a name can be a folder's: not empty, no slash, no control characters, neither "." nor "..", 100 bytes at

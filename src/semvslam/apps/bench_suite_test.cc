@@ -123,6 +123,10 @@ TEST(ParseSuite, EntriesAreFoldersOrScenes) {
   EXPECT_THAT(error_of("sequences: [{people: flying}]\n"), HasSubstr("flying"));
   EXPECT_THAT(error_of("sequences: [{people: none, size: big}]\n"), HasSubstr("size is WIDTHxHEIGHT"));
   EXPECT_THAT(error_of("sequences: [{people: none, name: a/b}]\n"), HasSubstr("'a/b' cannot be a sequence's name"));
+  EXPECT_THAT(error_of("sequences: [{people: none, camera: c.yaml}]\n"), HasSubstr("has a camera of its own"));
+  EXPECT_THAT(error_of("sequences: [{path: a, camera: c.yaml, camera_preset: bonn}]\n"),
+              HasSubstr("exclude each other"));
+  EXPECT_THAT(error_of("sequences: [{path: a, camera_preset: kinect}]\n"), HasSubstr("no built-in camera 'kinect'"));
   EXPECT_THAT(error_of("sequences: {path: a}\n"), HasSubstr("'sequences' is a list"));
   EXPECT_THAT(error_of("sequences: {99999999999999999999: a}\n"), HasSubstr("'sequences' is a list"));
 }
@@ -159,6 +163,17 @@ TEST(FindRecordings, ExpandsPatternsAndNamesWhatIsMissing) {
   EXPECT_EQ(found.recordings[2].limits.tracked_share, std::nullopt) << "an entry's limits are all that bind it";
   EXPECT_TRUE(found.recordings[3].scene);
   EXPECT_EQ(found.recordings[3].name, "none_halfsphere");
+}
+
+TEST(FindRecordings, ACameraFileIsLookedForBesideTheRecordings) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) fs::create_directory(folder / name);
+  const BenchSuite suite = good("sequences: [{path: a, camera: c.yaml}, {path: b, camera_preset: bonn}]\n");
+  const FoundRecordings found = find_recordings(suite, folder.path());
+  ASSERT_EQ(found.recordings.size(), 2u);
+  EXPECT_EQ(found.recordings[0].camera.file, (folder / "c.yaml").string());
+  EXPECT_EQ(found.recordings[1].camera.file, "");
+  EXPECT_EQ(found.recordings[1].camera.preset, "bonn");
 }
 
 TEST(FindRecordings, AFolderIsCalledByItsOwnName) {

@@ -153,7 +153,7 @@ std::string format_camera(const Camera& c) {
       c.depth_units_per_m, c.baseline_m);
 }
 
-std::optional<Camera> camera_preset(std::string_view name) {
+Result<Camera> camera_preset(std::string_view name) {
   // TUM: vision.in.tum.de/data/datasets/rgbd-dataset/file_formats (fr3 images are published undistorted).
   if (name == "tum_fr1") return preset(517.3, 516.5, 318.6, 255.3, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633});
   if (name == "tum_fr2") return preset(520.9, 521.0, 325.1, 249.7, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172});
@@ -165,7 +165,8 @@ std::optional<Camera> camera_preset(std::string_view name) {
   // same pixels seen by a camera whose y axis points down, as ours, have fy = +480; read_ground_truth mirrors its poses
   // to fit.
   if (name == "icl") return preset(481.2, 480.0, 319.5, 239.5, {});
-  return std::nullopt;
+  return invalid_input(fmt::format("no built-in camera {}; there are: {}", in_quotes(std::string(name)),
+                                   fmt::join(camera_preset_names(), ", ")));
 }
 
 std::vector<std::string> camera_preset_names() { return {"tum_fr1", "tum_fr2", "tum_fr3", "bonn", "icl"}; }
@@ -175,7 +176,8 @@ std::string camera_preset_of_folder(const std::string& folder_name) {
   std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
   const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
   for (const char* number : {"1", "2", "3"})
-    if (has((std::string("freiburg") + number).c_str())) return std::string("tum_fr") + number;
+    if (has((std::string("freiburg") + number).c_str()) || name.starts_with(std::string("fr") + number + '_'))
+      return std::string("tum_fr") + number;
   if (has("rgbd_bonn")) return "bonn";
   if (has("frei_png") || has("living_room_traj") || has("office_room_traj") || has("icl_nuim") || has("icl-nuim"))
     return "icl";

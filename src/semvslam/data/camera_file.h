@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,11 +26,12 @@ Result<Camera> read_camera(const std::filesystem::path& path);
 std::string format_camera(const Camera& camera);
 
 /// Built-in cameras by name: tum_fr1, tum_fr2, tum_fr3 (TUM RGB-D benchmark), bonn (Bonn RGB-D dynamic), icl
-/// (ICL-NUIM). Intrinsics as published by the makers of the recordings; nothing for an unknown name.
-std::optional<Camera> camera_preset(std::string_view preset);
+/// (ICL-NUIM). Intrinsics as published by the makers of the recordings. Errors: an unknown name.
+Result<Camera> camera_preset(std::string_view name);
 std::vector<std::string> camera_preset_names();
 
-/// The preset that belongs to a folder's customary name: rgbd_dataset_freiburg1_*, rgbd_bonn_*, *frei_png*, or "".
+/// The preset that belongs to a folder's customary name: rgbd_dataset_freiburg1_*, fr1_*, rgbd_bonn_*, *frei_png*, or
+/// "".
 std::string camera_preset_of_folder(const std::string& folder_name);
 
 }  // namespace semvslam

@@ -9,7 +9,7 @@ using ::testing::HasSubstr;
 
 constexpr const char* kMinimal = "width: 640\nheight: 480\nfx: 500\nfy: 501\ncx: 320\ncy: 240\n";
 
-std::string error_of(const std::string& text) {
+std::string camera_error(const std::string& text) {
   const Result<Camera> camera = parse_camera(text, "cam.yaml");
   return camera ? "" : camera.error().message;
 }
@@ -45,27 +45,27 @@ TEST(ParseCamera, ReadsAllKeysAndDefaultsTheRest) {
 TEST(ParseCamera, KnowsThreeSpellingsOfTheDepthFactor) {
   for (const char* key : {"depth_units_per_m", "depth_factor", "depth_scale"})
     EXPECT_EQ(parse_camera(std::string(kMinimal) + key + ": 1000\n", "x")->depth_units_per_m, 1000) << key;
-  EXPECT_THAT(error_of(std::string(kMinimal) + "depth_scale: 1000\ndepth_factor: 5000\n"),
+  EXPECT_THAT(camera_error(std::string(kMinimal) + "depth_scale: 1000\ndepth_factor: 5000\n"),
               HasSubstr("cam.yaml:8: 'depth_factor' is set a second time (first as 'depth_scale')"));
 }
 
 TEST(ParseCamera, ErrorsNameTheLineAndWhatToDo) {
-  EXPECT_THAT(error_of(std::string(kMinimal) + "basline: 0.1\n"),
+  EXPECT_THAT(camera_error(std::string(kMinimal) + "basline: 0.1\n"),
               HasSubstr("cam.yaml:7: unknown key 'basline'; did you mean 'baseline'?"));
-  EXPECT_THAT(error_of("width: 640\nheight: 480\n"), HasSubstr("key 'fx' is missing"));
-  EXPECT_THAT(error_of(with("fx", "abc")), HasSubstr("cam.yaml:3: 'fx' must be a finite number"));
-  EXPECT_THAT(error_of(with("fx", ".nan")), HasSubstr("'fx' must be a finite number"));
-  EXPECT_THAT(error_of(with("fx", "nan")), HasSubstr("'fx' must be a finite number"));
-  EXPECT_THAT(error_of(with("fx", "0")), HasSubstr("focal lengths must be positive"));
-  EXPECT_THAT(error_of(with("fx", "-5")), HasSubstr("focal lengths must be positive"));
-  EXPECT_THAT(error_of(with("fy", "-480")), HasSubstr("fy is negative (-480): write 480"));
-  EXPECT_THAT(error_of(with("width", "640.5")), HasSubstr("'width' must be a whole number"));
-  EXPECT_THAT(error_of(with("width", "1")), HasSubstr("outside 16..16384"));
-  EXPECT_THAT(error_of(with("cx", "700")), HasSubstr("principal point"));
-  EXPECT_THAT(error_of("fx: [1, 2]\n"), HasSubstr("flat list"));
-  EXPECT_THAT(error_of("just words"), HasSubstr("not a list of"));
-  EXPECT_THAT(error_of("fx: b: c\n"), HasSubstr("not valid YAML"));
-  EXPECT_THAT(error_of(""), HasSubstr("not a list of"));
+  EXPECT_THAT(camera_error("width: 640\nheight: 480\n"), HasSubstr("key 'fx' is missing"));
+  EXPECT_THAT(camera_error(with("fx", "abc")), HasSubstr("cam.yaml:3: 'fx' must be a finite number"));
+  EXPECT_THAT(camera_error(with("fx", ".nan")), HasSubstr("'fx' must be a finite number"));
+  EXPECT_THAT(camera_error(with("fx", "nan")), HasSubstr("'fx' must be a finite number"));
+  EXPECT_THAT(camera_error(with("fx", "0")), HasSubstr("focal lengths must be positive"));
+  EXPECT_THAT(camera_error(with("fx", "-5")), HasSubstr("focal lengths must be positive"));
+  EXPECT_THAT(camera_error(with("fy", "-480")), HasSubstr("fy is negative (-480): write 480"));
+  EXPECT_THAT(camera_error(with("width", "640.5")), HasSubstr("'width' must be a whole number"));
+  EXPECT_THAT(camera_error(with("width", "1")), HasSubstr("outside 16..16384"));
+  EXPECT_THAT(camera_error(with("cx", "700")), HasSubstr("principal point"));
+  EXPECT_THAT(camera_error("fx: [1, 2]\n"), HasSubstr("flat list"));
+  EXPECT_THAT(camera_error("just words"), HasSubstr("not a list of"));
+  EXPECT_THAT(camera_error("fx: b: c\n"), HasSubstr("not valid YAML"));
+  EXPECT_THAT(camera_error(""), HasSubstr("not a list of"));
 }
 
 TEST(FormatCamera, IsReadBackBitForBit) {
@@ -86,7 +86,8 @@ TEST(CameraPreset, AllNamesExistAndAreValid) {
     ASSERT_TRUE(camera_preset(name)) << name;
     EXPECT_TRUE(camera_preset(name)->check().ok()) << name;
   }
-  EXPECT_FALSE(camera_preset("tum_fr4"));
+  EXPECT_EQ(camera_preset("tum_fr4").error().message,
+            "no built-in camera 'tum_fr4'; there are: tum_fr1, tum_fr2, tum_fr3, bonn, icl");
   EXPECT_EQ(camera_preset("tum_fr1")->distortion.k3, 1.1633);
   EXPECT_EQ(camera_preset("tum_fr2")->cx_px, 325.1);
   EXPECT_EQ(camera_preset("icl")->fy_px, 480);
@@ -97,8 +98,11 @@ TEST(CameraPreset, IsKnownByTheFoldersName) {
   EXPECT_EQ(camera_preset_of_folder("rgbd_dataset_freiburg2_xyz"), "tum_fr2");
   EXPECT_EQ(camera_preset_of_folder("rgbd_dataset_freiburg3_walking_xyz"), "tum_fr3");
   EXPECT_EQ(camera_preset_of_folder("rgbd_bonn_balloon"), "bonn");
+  EXPECT_EQ(camera_preset_of_folder("fr3_sitting_rpy"), "tum_fr3");
   EXPECT_EQ(camera_preset_of_folder("living_room_traj0_frei_png"), "icl");
   EXPECT_EQ(camera_preset_of_folder("kitchen"), "");
+  EXPECT_EQ(camera_preset_of_folder("fr4_kitchen"), "");
+  EXPECT_EQ(camera_preset_of_folder("afr3_kitchen"), "");
 }
 
 }  // namespace

@@ -36,10 +36,8 @@ struct NamedCamera {
 };
 
 Result<NamedCamera> preset_camera(const std::string& preset) {
-  const std::optional<Camera> camera = camera_preset(preset);
-  if (!camera)
-    return Error{ErrorCode::kInvalidInput,
-                 fmt::format("no built-in camera '{}'; there are: {}", preset, join(camera_preset_names()))};
+  const Result<Camera> camera = camera_preset(preset);
+  if (!camera) return camera.error();
   return NamedCamera{*camera, "built-in " + preset};
 }
 
