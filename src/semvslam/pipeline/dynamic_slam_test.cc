@@ -93,6 +93,11 @@ TEST_F(DynamicSlamTest, EveryFrameIsTrackedWithItsOwnMask) {
     const float x_px = 60.f + static_cast<float>(mask.frame.value) + 30.f;
     EXPECT_TRUE(mask.moving.contains({x_px, 120.f})) << "the key frame keeps its mask";
     EXPECT_FALSE(mask.moving.contains({x_px + 60.f, 120.f}));
+    ASSERT_TRUE(mask.classes);
+    ASSERT_EQ(mask.classes->size(), 1u);
+    EXPECT_EQ(mask.classes->front().class_name, "person");
+    EXPECT_TRUE(mask.classes->front().pixels.contains({x_px, 120.f}));
+    EXPECT_FALSE(mask.classes->front().pixels.contains({x_px + 60.f, 120.f}));
   }
 }
 

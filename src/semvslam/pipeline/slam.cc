@@ -11,6 +11,7 @@
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/map/map_file.h"
+#include "semvslam/pipeline/key_frame_classes.h"
 #include "semvslam/pipeline/saved_map.h"
 #include "semvslam/pipeline/segmentation_stage.h"
 
@@ -65,6 +66,7 @@ struct Slam::Impl {
   Tracker tracker;
   StageTimers timers;
   std::vector<std::shared_ptr<Sink>> sinks;
+  KeyFrameClasses classes;
   const std::uint64_t loaded_key_frames, loaded_landmarks;
 
   mutable std::mutex map_mutex;  // a query never sees half a mapping step
@@ -381,7 +383,10 @@ TrackResult Slam::Impl::track(const RgbdFrame& frame, const Segmentation* mask) 
   result.mask_source = tracked.dynamic->mask_source;
   result.tracking_ms = tracked.times.total_ms;
   result.dynamic = tracked.dynamic;
-  if (tracked.key_frame) submit(std::move(*tracked.key_frame));
+  if (tracked.key_frame) {
+    classes.keep(frame.id, mask);
+    submit(std::move(*tracked.key_frame));
+  }
   if (tracked.local_map) submit(*tracked.local_map);
   if (tracked.state == TrackingState::kTracking && !tracked.relative) {
     if (const auto local = newest_map()) tracked.relative = RelativePose{local->reference, SE3()};
@@ -452,7 +457,7 @@ std::vector<KeyFrameMask> Slam::key_frame_masks() const {
   std::lock_guard lock(impl_->map_mutex);
   std::vector<KeyFrameMask> masks;
   impl_->for_key_frames_of_session([&](const KeyFrame& key_frame) {
-    masks.push_back({key_frame.frame, key_frame.stamp, key_frame.features->moving});
+    masks.push_back({key_frame.frame, key_frame.stamp, key_frame.features->moving, impl_->classes.of(key_frame.frame)});
   });
   return masks;
 }

@@ -71,6 +71,8 @@ struct KeyFrameMask {
   FrameId frame;
   TimeStamp stamp;
   MaskRuns moving;  // recorded pixels of what moves or may; set nowhere if nothing does
+  /// What its own segmentation shows, the movers included; empty where it had none.
+  std::optional<std::vector<ClassMask>> classes;
 };
 
 /// Receives what happens; called on the thread of process().

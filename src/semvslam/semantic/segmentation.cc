@@ -1,5 +1,8 @@
 #include "semvslam/semantic/segmentation.h"
 
+#include <map>
+#include <utility>
+
 namespace semvslam {
 namespace {
 
@@ -29,6 +32,20 @@ cv::Mat Segmentation::labels() const {
   cv::Mat out = cv::Mat::zeros(size, CV_16UC1);
   for (std::size_t n = instances.size(); n-- > 0;)  // the best is drawn last
     out(instances[n].window).setTo(cv::Scalar(static_cast<double>(n + 1)), instances[n].mask);
+  return out;
+}
+
+std::vector<ClassMask> Segmentation::class_masks() const {
+  const cv::Mat instance_of_pixel = labels();
+  std::map<int, std::pair<std::string, cv::Mat>> classes;
+  for (std::size_t n = 0; n < instances.size(); ++n) {
+    auto& [name, mask] = classes[instances[n].class_index];
+    if (mask.empty()) name = instances[n].class_name, mask = cv::Mat::zeros(size, CV_8UC1);
+    mask(instances[n].window).setTo(255, instance_of_pixel(instances[n].window) == static_cast<double>(n + 1));
+  }
+  std::vector<ClassMask> out;
+  for (const auto& [index, named] : classes)
+    if (MaskRuns pixels(named.second); pixels.is_set_anywhere()) out.push_back({index, named.first, std::move(pixels)});
   return out;
 }
 

@@ -6,6 +6,7 @@
 
 #include "semvslam/base/ids.h"
 #include "semvslam/base/time_stamp.h"
+#include "semvslam/geometry/mask_runs.h"
 #include "semvslam/semantic/roles.h"
 
 namespace semvslam {
@@ -33,6 +34,13 @@ struct Instance {
   TrackId track;  // set by SegmentationRepair, none before
 };
 
+/// Where a class is to be seen in an image, kept small.
+struct ClassMask {
+  int class_index = 0;  // as in Instance
+  std::string class_name;
+  MaskRuns pixels;
+};
+
 /// What is to be seen in one image. Late data: it names the frame that it was made from.
 struct Segmentation {
   FrameId frame;
@@ -46,6 +54,9 @@ struct Segmentation {
   cv::Mat mask_of_class(std::string_view class_name) const;
   /// CV_16UC1: 0 = none, n = instance n - 1. Where two overlap the better one wins.
   cv::Mat labels() const;
+  /// Of every class that is to be seen, ascending by class_index. A pixel belongs to one of them: where instances
+  /// overlap, to the better one's.
+  std::vector<ClassMask> class_masks() const;
   /// Number of pixels of the class, each counted once.
   int pixels_of_class(std::string_view class_name) const;
 };

@@ -178,5 +178,23 @@ TEST(Segmentation, WhereTwoOverlapTheBetterOneIsLabelled) {
   EXPECT_EQ(labels.at<std::uint16_t>(0, 0), 0);
 }
 
+TEST(Segmentation, EveryPixelHasTheClassOfTheBetterInstance) {
+  Segmentation s = two_objects();
+  s.instances[1].class_index = 21;
+  s.instances.push_back(s.instances[1]);
+  s.instances.back().window.x += 8;
+  s.instances.push_back(s.instances[0]);
+  s.instances.back().class_index = 19;  // hidden by the first
+  const std::vector<ClassMask> classes = s.class_masks();
+  ASSERT_EQ(classes.size(), 2u);
+  EXPECT_EQ(classes[0].class_name, "person");
+  EXPECT_EQ(cv::countNonZero(classes[0].pixels.mask()), 36);
+  EXPECT_EQ(classes[1].class_name, "cup");
+  EXPECT_EQ(classes[1].class_index, 21);
+  EXPECT_EQ(cv::countNonZero(classes[1].pixels.mask()), 16 - 4 + 16);
+  EXPECT_FALSE(classes[1].pixels.contains({7, 7}));
+  EXPECT_TRUE(Segmentation().class_masks().empty());
+}
+
 }  // namespace
 }  // namespace semvslam
