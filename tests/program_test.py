@@ -68,26 +68,32 @@ class ProgramTest(ProgramCase):
         self.assertEqual(12 * count, len(body))
 
     def test_a_dense_map_is_made_on_request(self):
-        cloud = self.folder / "new" / "cloud.pcd"
-        done = call("run", self.whole, "--out", self.out, "--max-frames", 20, "--dense-map", cloud, "--quiet")
+        cloud, octree = self.folder / "new" / "cloud.pcd", self.folder / "other" / "room.bt"
+        done = call("run", "--dense-map", cloud, "--dense-map", octree, self.whole, "--out", self.out, "--max-frames", 20,
+                    "--quiet")
         self.assertEqual(0, done.returncode, done.stderr)
         header, body = cloud.read_bytes().split(b"DATA binary\n", 1)
         count = int(header.split(b"POINTS ")[1].split()[0])
         self.assertLess(5000, count)
-        self.assertEqual(16 * count, len(body))
+        self.assertIn(b"FIELDS x y z rgb label\n", header)
+        self.assertEqual(20 * count, len(body))
         self.assertIn(f"dense map {count} points", done.stdout)
+        self.assertTrue(octree.read_bytes().startswith(b"# Octomap OcTree binary file\n"))
+        self.assertRegex(done.stdout, r"its octree \d+ cubes occupied, \d+ free\n")
         self.assertFalse((self.out / "dense.ply").exists())
 
     def test_deterministic_runs_are_equal(self):
         runs = [self.out / name for name in ("a", "b")]
+        maps = ("dense.ply", "dense.ot")
+        dense = lambda run: [word for name in maps for word in ("--dense-map", run / name)]
         self.assertEqual(0, call("run", self.whole, "--out", runs[0], "--deterministic", "--quiet",
-                                 "--dense-map", runs[0] / "dense.ply").returncode)
+                                 *dense(runs[0])).returncode)
         # The second one on a single processor: the order of threads must not matter either.
         one = {min(os.sched_getaffinity(0))}
         self.assertEqual(0, call("run", self.whole, "--out", runs[1], "--deterministic", "--quiet",
-                                 "--dense-map", runs[1] / "dense.ply",
+                                 *dense(runs[1]),
                                  preexec_fn=lambda: os.sched_setaffinity(0, one)).returncode)
-        for name in ("trajectory.txt", "keyframes.txt", "map.ply", "dense.ply"):
+        for name in ("trajectory.txt", "keyframes.txt", "map.ply", *maps):
             self.assertTrue(filecmp.cmp(runs[0] / name, runs[1] / name, shallow=False), name)
 
     def test_max_frames(self):
@@ -105,7 +111,7 @@ class ProgramTest(ProgramCase):
         self.expect_error(call(*run, "--mode", "magic"), 3, "--mode: mode must be one of orb,", "'magic'")
         self.expect_error(call(*run, "--masks", "nowhere"), 3, "nowhere: no such folder")
         self.expect_error(call(*run, "--truth-masks", "nowhere"), 3, "nowhere: no such folder")
-        self.expect_error(call(*run, "--dense-map", "cloud.xyz"), 3, "cloud.xyz", ".ply or .pcd")
+        self.expect_error(call(*run, "--dense-map", "cloud.xyz"), 3, "cloud.xyz", ".ply or .pcd", ".bt or .ot")
         self.expect_error(call(*run, "--set", "dense.max_depth_m=0.2"), 3, "dense.min_depth_m = 0.3")
 
     def test_missing_and_empty_sequences(self):
@@ -174,6 +180,15 @@ class ProgramTest(ProgramCase):
         with open("/dev/full", "w", encoding="ascii") as full:
             self.expect_error(call("eval", truth, truth, stdout=full), 4, "standard output")
             self.expect_error(call("config", stdout=full), 4, "standard output")
+
+    def test_a_dense_map_on_a_full_disk(self):
+        if not os.path.exists("/dev/full"):
+            self.skipTest("this system has no /dev/full")
+        full, other = self.folder / "full.bt", self.folder / "other.ply"
+        full.symlink_to("/dev/full")
+        self.expect_error(call("run", self.whole, "--out", self.out, "--mode", "orb", "--max-frames", 5, "--quiet",
+                               "--dense-map", full, "--dense-map", other), 4, "full.bt")
+        self.assertTrue(other.exists(), "what can be written is")
 
     def test_demo_says_at_once_that_it_cannot_write(self):
         caches = {**os.environ, "XDG_CACHE_HOME": str(self.folder / "cache")}

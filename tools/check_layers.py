@@ -36,6 +36,7 @@ ALLOWED = {
 FOREIGN = {
     "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "dense", "tracking", "map"}),
     "Ceres": (re.compile(r"ceres/"), {"solve"}),
+    "OctoMap": (re.compile(r"octomap/"), set()),
     "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),
     "CLI11": (re.compile(r"CLI/"), {"apps"}),
@@ -43,7 +44,7 @@ FOREIGN = {
     "yaml-cpp": (re.compile(r"yaml-cpp/"), {"base", "data", "semantic"}),
 }
 # Tests and benchmarks may go further: they build their inputs and references with whatever they like.
-FREE_FOR_TESTS = {"OpenCV", "nlohmann-json", "yaml-cpp"}
+FREE_FOR_TESTS = {"OpenCV", "OctoMap", "nlohmann-json", "yaml-cpp"}
 TEST_ONLY_MODULES = {"render", "data"}  # any test may use these to make its input
 
 MAX_FILE_LINES = 500

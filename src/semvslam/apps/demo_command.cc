@@ -26,7 +26,7 @@ Result<int> run_mode(const DemoArguments& a, const fs::path& sequence, const std
   if (const Status status = config.apply_mode(mode); !status) return status.error();
   RunOptions options;
   options.out = fs::path(a.out) / mode;
-  options.dense_map = options.out / "dense.ply";
+  options.dense_maps = {options.out / "dense.ply"};
   options.quiet = a.quiet;
   options.before = ProcessTime::now();
   return run_recording(sequence, {}, config, options);

@@ -1,17 +1,21 @@
 #include "semvslam/apps/dense_map.h"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "semvslam/apps/render_scene.h"
 #include "semvslam/base/temporary_folder_test_support.h"
+#include "semvslam/data/file_io.h"
 
 namespace semvslam {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 namespace fs = std::filesystem;
 
 /// A short rendered recording of an empty room, with its true poses.
@@ -29,8 +33,8 @@ class DenseMapTest : public testing::Test {
     poses_ = *truth;
   }
 
-  Result<DenseMapSummary> make(const fs::path& file, const Trajectory& poses) const {
-    return make_dense_map(folder_ / "room", {}, poses, {}, {}, file);
+  Result<DenseMapSummary> make(const std::vector<fs::path>& files, const Trajectory& poses) const {
+    return make_dense_map(folder_ / "room", {}, poses, {}, {}, files);
   }
 
   const testing_support::TemporaryFolder folder_;
@@ -38,7 +42,7 @@ class DenseMapTest : public testing::Test {
 };
 
 TEST_F(DenseMapTest, KeyFramesBecomeACloud) {
-  const Result<DenseMapSummary> made = make(folder_ / "map.ply", {poses_[0], poses_[2]});
+  const Result<DenseMapSummary> made = make({folder_ / "map.ply"}, {poses_[0], poses_[2]});
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->key_frames, 2u);
   EXPECT_EQ(made->absent, 0u);
@@ -50,7 +54,7 @@ TEST_F(DenseMapTest, KeyFramesBecomeACloud) {
 TEST_F(DenseMapTest, AKeyFrameThatCannotBeReadAgainIsCountedAsAbsent) {
   StampedPose between = poses_[1];
   between.stamp.ns += 1'000'000;
-  const Result<DenseMapSummary> made = make(folder_ / "map.pcd", {poses_[0], between, poses_[3]});
+  const Result<DenseMapSummary> made = make({folder_ / "map.pcd"}, {poses_[0], between, poses_[3]});
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->key_frames, 2u);
   EXPECT_EQ(made->absent, 1u);
@@ -58,8 +62,30 @@ TEST_F(DenseMapTest, AKeyFrameThatCannotBeReadAgainIsCountedAsAbsent) {
 }
 
 TEST_F(DenseMapTest, AFolderThatIsNoneAndADiskThatRefusesAreErrors) {
-  EXPECT_FALSE(make_dense_map(folder_ / "absent", {}, poses_, {}, {}, folder_ / "map.ply"));
-  EXPECT_FALSE(make(folder_ / "absent" / "map.ply", {poses_[0]}));
+  EXPECT_FALSE(make_dense_map(folder_ / "absent", {}, poses_, {}, {}, {folder_ / "map.ply"}));
+  EXPECT_FALSE(make({folder_ / "absent" / "map.ply", folder_ / "map.bt"}, {poses_[0]}));
+  EXPECT_TRUE(fs::exists(folder_ / "map.bt")) << "one file does not keep the next from being written";
+}
+
+TEST_F(DenseMapTest, PointsAndOctreesAreMadeAtOnceAndTwiceTheSame) {
+  const std::vector<fs::path> files{folder_ / "a.ply", folder_ / "a.bt", folder_ / "a.ot", folder_ / "b.bt"};
+  const Result<DenseMapSummary> made = make(files, {poses_[0], poses_[2]});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_GT(made->occupied, 500u);
+  EXPECT_GT(made->free, 5 * made->occupied);
+  EXPECT_THAT(format_summary(*made), HasSubstr(fmt::format("{} cubes occupied, {} free", made->occupied, made->free)));
+  ASSERT_TRUE(make({folder_ / "again.ot"}, {poses_[0], poses_[2]}));
+  const auto content = [&](const char* name) { return read_text_file(folder_ / name).value(); };
+  EXPECT_EQ(content("a.bt"), content("b.bt"));
+  EXPECT_EQ(content("a.ot"), content("again.ot"));
+  EXPECT_THAT(format_summary(*make({folder_ / "map.ply"}, {poses_[0]})), Not(HasSubstr("octree")));
+}
+
+TEST_F(DenseMapTest, OfNoKeyFrameComeEmptyFiles) {
+  const Result<DenseMapSummary> made = make({folder_ / "a.ply", folder_ / "a.bt", folder_ / "a.ot"}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->points + made->occupied + made->free, 0u);
+  for (const char* name : {"a.ply", "a.bt", "a.ot"}) EXPECT_GT(fs::file_size(folder_ / name), 0u);
 }
 
 /// The same room without people and with them, exact pictures and poses.
@@ -103,6 +129,20 @@ class RoomWithPeople : public testing::Test {
     return static_cast<double>(count) / static_cast<double>(points.size());
   }
 
+  /// The octree's cubes in which the pictures show a surface, of a person or of the room.
+  std::set<OctreeCode> surface_cubes(const std::vector<RenderedFrame>& views, bool of_people) const {
+    std::set<OctreeCode> cubes;
+    for (const RenderedFrame& view : views)
+      for (int y = 0; y < camera_.height_px; ++y)
+        for (int x = 0; x < camera_.width_px; ++x) {
+          if ((view.instances.at<std::uint8_t>(y, x) != 0) != of_people) continue;
+          const Eigen::Vector3d p = view.world_from_camera *
+                                    camera_.back_project(camera_.undistort({x, y}), view.frame.depth.at<float>(y, x));
+          cubes.insert(octree_code((p.array() / DenseOptions().octree_m).floor().cast<int>().matrix()).value());
+        }
+    return cubes;
+  }
+
   Camera camera_;
   std::vector<RenderedFrame> empty_, people_;
 };
@@ -124,6 +164,59 @@ TEST_F(RoomWithPeople, MasksKeepThemOutAndFreeSpaceClearsWhatMasksMissed) {
   VoxelMap room(camera_, {});
   for (const RenderedFrame& view : empty_) ASSERT_TRUE(room.integrate(view.frame, {}, view.world_from_camera));
   EXPECT_LT(ghosts(room.points()), 1e-3);
+}
+
+TEST_F(RoomWithPeople, LabelsAgreeWithTheTruth) {
+  VoxelMap map(camera_, {});
+  for (const RenderedFrame& view : people_)
+    ASSERT_TRUE(map.integrate(view.frame, {}, view.world_from_camera, view.instances > 0));
+  std::size_t people = 0, room = 0, wrong = 0;
+  for (const CloudPoint& point : map.points())
+    for (const RenderedFrame& view : people_) {
+      const Eigen::Vector3d p = view.world_from_camera.inverse() * point.position_m.cast<double>();
+      if (p.z() < .3) continue;
+      const Eigen::Vector2d pixel = camera_.distort(camera_.project(p));
+      const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
+      if (!cv::Rect(0, 0, camera_.width_px, camera_.height_px).contains(at)) continue;
+      if (std::abs(view.frame.depth.at<float>(at) - p.z()) > .01) continue;  // hidden, or it has gone
+      const bool is_person = view.instances.at<std::uint8_t>(at) != 0;
+      ++(is_person ? people : room);
+      wrong += is_person != (point.label != 0);
+    }
+  EXPECT_GT(people, 1000u);
+  EXPECT_GT(room, 10000u);
+  EXPECT_LE(wrong, (people + room) / 1000);
+}
+
+/// Cubes of a map, as codes.
+std::set<OctreeCode> codes(const std::vector<OctreeLeaf>& leaves, bool occupied) {
+  std::set<OctreeCode> out;
+  for (const OctreeLeaf& leaf : leaves)
+    if (leaf.occupied == occupied) out.insert(leaf.code);
+  return out;
+}
+
+std::size_t count_common(const std::set<OctreeCode>& a, const std::set<OctreeCode>& b) {
+  return static_cast<std::size_t>(std::ranges::count_if(a, [&](OctreeCode code) { return b.contains(code); }));
+}
+
+TEST_F(RoomWithPeople, TheOctreeKnowsTheRoomAndNotThePeople) {
+  VoxelMap map(camera_, {}), room(camera_, {});
+  for (const RenderedFrame& view : people_)
+    ASSERT_TRUE(map.integrate(view.frame, view.instances, view.world_from_camera));
+  for (const RenderedFrame& view : empty_) ASSERT_TRUE(room.integrate(view.frame, {}, view.world_from_camera));
+  const std::vector<OctreeLeaf> leaves = map.octree(map.points());
+  const std::set<OctreeCode> occupied = codes(leaves, true), free = codes(leaves, false);
+  const std::set<OctreeCode> walls = surface_cubes(empty_, false), people = surface_cubes(people_, true);
+  const std::set<OctreeCode> free_without_people = codes(room.octree(room.points()), false);
+  EXPECT_GT(occupied.size(), 5000u);
+  EXPECT_GT(free.size(), 100000u);
+  // Of surfaces in the plane between two cubes, as the floor is, rounding decides.
+  EXPECT_GE(count_common(occupied, walls), occupied.size() * 99 / 100) << "what is occupied lies on a surface";
+  EXPECT_LE(count_common(free, walls), free.size() / 1000) << "what is free is empty";
+  // Where people were seen, and without them nothing stands: free, but for what only the hidden part of a view shows.
+  EXPECT_LE(count_common(people, occupied), people.size() / 200);
+  EXPECT_GE(count_common(people, free), count_common(people, free_without_people) * 8 / 10);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "semvslam/apps/run_session.h"
 #include "semvslam/data/file_io.h"
 #include "semvslam/data/sequence.h"
-#include "semvslam/dense/point_cloud.h"
+#include "semvslam/dense/dense_file.h"
 
 namespace semvslam {
 namespace {
@@ -18,9 +18,9 @@ namespace {
 constexpr const char* kDefaultMode = "full";
 
 struct RunArguments {
-  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks,
-      dense_map, map, save_map;
-  std::vector<std::string> assignments;
+  std::string sequence, out, config_file, mode, camera, preset, masks, debug_frames, key_frame_masks, truth_masks, map,
+      save_map;
+  std::vector<std::string> assignments, dense_maps;
   std::uint64_t max_frames = 0;
   bool deterministic = false, realtime = false, quiet = false, localise = false;
 };
@@ -72,13 +72,13 @@ Result<int> run(const RunArguments& a) {
     if (!masks) return masks.error();
     options.truth_masks = std::move(*masks);
   }
-  if (!a.dense_map.empty()) {
-    options.dense_map = a.dense_map;
-    if (const Status status = check_cloud_name(options.dense_map); !status) return status.error();
+  for (const std::string& file : a.dense_maps) {
+    if (const Result<DenseFormat> format = dense_format(file); !format) return format.error();
+    options.dense_maps.emplace_back(file);
   }
   options.map = a.map;
   options.save_map = a.save_map;
-  if (config.mapping.frozen && !(a.dense_map.empty() && a.key_frame_masks.empty()))
+  if (config.mapping.frozen && !(a.dense_maps.empty() && a.key_frame_masks.empty()))
     return Error{ErrorCode::kInvalidInput,
                  "--dense-map and --key-frame-masks are of a run's key frames: only localising "
                  "(--localise, mapping.frozen) makes none"};
@@ -107,9 +107,12 @@ CommandHandler setup_run(CLI::App& parser) {
                     "folder for a PNG per key frame, 255 = pixel of something that moves; none where nothing does");
   parser.add_option("--truth-masks", a->truth_masks,
                     "folder with the true masks (PNG, as given or in the sequence): stats.json gets a part `truth`");
-  parser.add_option(
-      "--dense-map", a->dense_map,
-      "file (.ply or .pcd) for a coloured point cloud of the static scene, made of the key frames at the end");
+  parser
+      .add_option(
+          "--dense-map", a->dense_maps,
+          "file for a map of the static scene, made of the key frames at the end: .ply or .pcd, coloured points; "
+          ".bt or .ot, an octree of what is occupied and what is free; may be repeated")
+      ->allow_extra_args(false);
   parser.add_option("--save-map", a->save_map, "file for the map at the end, for --map and 'semvslam map'");
   CLI::Option* map = parser.add_option(
       "--map", a->map,

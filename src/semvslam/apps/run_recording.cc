@@ -52,10 +52,10 @@ Result<int> run_recording(const std::filesystem::path& sequence, SequenceOptions
   Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
   if (!outcome) return outcome.error();
   fmt::print("{}", format_summary(outcome->record, outcome->statistics));
-  if (!options.dense_map.empty() && !outcome->key_frames.empty()) {
+  if (!options.dense_maps.empty() && !outcome->key_frames.empty()) {
     sequence_options.on_warning = nullptr;  // said before
     const Result<DenseMapSummary> dense = make_dense_map(sequence, sequence_options, outcome->key_frames,
-                                                         outcome->key_frame_masks, config.dense, options.dense_map);
+                                                         outcome->key_frame_masks, config.dense, options.dense_maps);
     if (dense) fmt::print("{}", format_summary(*dense));
     if (!dense && outcome->status) outcome->status = dense.error();
   }

@@ -301,7 +301,9 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
   if (!options.key_frame_masks.empty())
     if (const Status status = make_folder(options.key_frame_masks); !status) return status.error();
   // Now: after the run is late to find out that there is no place for them.
-  for (const std::filesystem::path& file : {options.dense_map, options.save_map})
+  std::vector<std::filesystem::path> files = options.dense_maps;
+  files.push_back(options.save_map);
+  for (const std::filesystem::path& file : files)
     if (file.has_parent_path())
       if (const Status status = make_folder(file.parent_path()); !status) return status.error();
   std::shared_ptr<TruthMaskSink> truth;

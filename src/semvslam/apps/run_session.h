@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "semvslam/apps/run_statistics.h"
 #include "semvslam/base/process_stats.h"
@@ -28,10 +29,10 @@ struct RunOptions {
   std::filesystem::path debug_frames;     // folder for a picture per frame of what was taken for moving; empty = none
   std::filesystem::path key_frame_masks;  // folder for what moved in each key frame; empty = none
   std::filesystem::path truth_masks;      // folder of true masks to judge the policy by; empty = none
-  std::filesystem::path dense_map;        // point cloud (.ply, .pcd) to make of the key frames at the end; empty = none
-  std::filesystem::path map;              // saved map to begin in; empty = none
-  std::filesystem::path save_map;         // file for the map at the end; empty = none
-  ProcessTime before;                     // spent on something else, as the demo on rendering: not counted to the run
+  std::vector<std::filesystem::path> dense_maps;  // files (see dense_format()) for a map of the key frames at the end
+  std::filesystem::path map;                      // saved map to begin in; empty = none
+  std::filesystem::path save_map;                 // file for the map at the end; empty = none
+  ProcessTime before;  // spent on something else, as the demo on rendering: not counted to the run
 };
 
 /// How a run ended; everything computed is in the output folder.

@@ -1,4 +1,4 @@
-// What a dense map costs: adding a key frame, and taking the points out at the end.
+// What a dense map costs: adding a key frame, and taking the points and the octree out at the end.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -39,14 +39,33 @@ void integrate(benchmark::State& state) {
 }
 BENCHMARK(integrate)->Unit(benchmark::kMillisecond);
 
-void points_of_100_key_frames(benchmark::State& state) {
+VoxelMap map_of_100_key_frames() {
   const RgbdFrame f = frame();
   VoxelMap map(camera(), {});
   for (int k = 0; k < 100; ++k) (void)map.integrate(f, {}, pose(k));
+  return map;
+}
+
+void points_of_100_key_frames(benchmark::State& state) {
+  VoxelMap map = map_of_100_key_frames();
   std::size_t count = 0;
   for (auto _ : state) count = map.points().size();
   state.counters["points"] = static_cast<double>(count);
 }
 BENCHMARK(points_of_100_key_frames)->Unit(benchmark::kMillisecond);
+
+void octree_of_100_key_frames(benchmark::State& state) {
+  VoxelMap map = map_of_100_key_frames();
+  const std::vector<CloudPoint> points = map.points();
+  std::size_t cubes = 0, bytes = 0;
+  for (auto _ : state) {
+    const std::vector<OctreeLeaf> leaves = map.octree(points);
+    cubes = leaves.size();
+    bytes = format_bt(leaves, DenseOptions().octree_m).size();
+  }
+  state.counters["cubes"] = static_cast<double>(cubes);
+  state.counters["bytes"] = static_cast<double>(bytes);
+}
+BENCHMARK(octree_of_100_key_frames)->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -3,27 +3,31 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <filesystem>
+#include <map>
+#include <optional>
 #include <span>
 #include <string>
-
-#include "semvslam/base/result.h"
+#include <vector>
 
 namespace semvslam {
 
 struct CloudPoint {
   Eigen::Vector3f position_m = Eigen::Vector3f::Zero();  // world
   std::array<std::uint8_t, 3> rgb{};
+  std::uint8_t label = 0;  // number of its class; 0 = none
 };
 
-/// Binary little-endian PLY: float x y z, uchar red green blue.
-std::string format_ply(std::span<const CloudPoint> points);
-/// Binary PCD 0.7 of the Point Cloud Library: float x y z, and rgb packed into the bits of a float, as it wants them.
-std::string format_pcd(std::span<const CloudPoint> points);
+/// The classes of labels.
+using LabelNames = std::map<std::uint8_t, std::string>;
 
-/// Whether a file's name says in which of the two formats it shall be. Errors: neither.
-Status check_cloud_name(const std::filesystem::path& file);
-/// By the file's name; in one step. Errors: as check_cloud_name(); not writable, disk full.
-Status write_cloud(const std::filesystem::path& file, std::span<const CloudPoint> points);
+/// Binary little-endian PLY: float x y z, uchar red green blue; uchar label where there are names for labels, which
+/// then stand in comments.
+std::string format_ply(std::span<const CloudPoint> points, const std::optional<LabelNames>& names = {});
+/// Binary PCD 0.7 of the Point Cloud Library: float x y z, and rgb packed into the bits of a float, as it wants them;
+/// label of 32 bits like format_ply().
+std::string format_pcd(std::span<const CloudPoint> points, const std::optional<LabelNames>& names = {});
+
+/// The points with a colour for each label; those of none in shades of grey.
+std::vector<CloudPoint> coloured_by_label(std::span<const CloudPoint> points);
 
 }  // namespace semvslam

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -15,9 +14,8 @@
 namespace semvslam {
 namespace {
 
-constexpr int kBits = 21;
+constexpr int kBits = 18, kLabelBits = 8;
 constexpr std::int64_t kHalf = std::int64_t{1} << (kBits - 1);
-constexpr int kBlockPx = 4;                     // side of a block of View::free_m
 constexpr std::size_t kLeastPending = 1 << 20;  // voxels that are worth merging
 
 cv::Mat metres(const cv::Mat& depth, float metres_per_unit) {
@@ -28,61 +26,35 @@ cv::Mat metres(const cv::Mat& depth, float metres_per_unit) {
 }
 
 /// Of the voxel: its corner with the least coordinates.
-Eigen::Vector3d corner_m(std::uint64_t place, double voxel_m) {
+Eigen::Vector3d corner_m(std::uint64_t key, double voxel_m) {
   constexpr std::uint64_t kMask = (std::uint64_t{1} << kBits) - 1;
   const auto axis = [&](int bits) {
-    return static_cast<double>(static_cast<std::int64_t>(place >> bits & kMask) - kHalf);
+    return static_cast<double>(static_cast<std::int64_t>(key >> (kLabelBits + bits) & kMask) - kHalf);
   };
   return voxel_m * Eigen::Vector3d(axis(2 * kBits), axis(kBits), axis(0));
 }
 
+std::uint64_t place_of(std::uint64_t key) { return key >> kLabelBits; }
+
 }  // namespace
 
-void DenseOptions::add_to(ConfigSchema& schema) {
-  schema.add("dense.voxel_m", &voxel_m, {0.001, 1}, "side of the cubes that the dense map's points are averaged in, m");
-  schema.add("dense.min_depth_m", &min_depth_m, {0, 100}, "nearer depth does not get into it, m");
-  schema.add("dense.max_depth_m", &max_depth_m, {0.1, 1000}, "farther depth does not get into it, m");
-  schema.add("dense.edge_share", &edge_share, {0.001, 10},
-             "a larger step to a neighbouring pixel is a depth edge, which is left out, share of the depth");
-  schema.add("dense.margin_px", &margin_px, {0, 100}, "so much around what moves is left out, px");
-  schema.add("dense.least_frames", &least_frames, {1, 1000}, "key frames that must have measured a point");
-  schema.add("dense.seen_through", &seen_through, {1, 100000},
-             "a point goes when so many key frames look through it ...");
-  schema.add("dense.seen_through_share", &seen_through_share, {0, 1000}, "... and so many for each that measured it");
-  schema.add("dense.free_margin_m", &free_margin_m, {0, 10},
-             "looking through: depth behind the point by this at least, m");
-  schema.add("dense.free_share", &free_share, {0, 1}, "and by this share of its depth more");
-}
-
-Status DenseOptions::check() const {
-  if (min_depth_m < max_depth_m) return Status::success();
-  return Error{ErrorCode::kInvalidInput,
-               fmt::format("dense.min_depth_m = {} is not less than dense.max_depth_m = {}", min_depth_m, max_depth_m)};
-}
-
-VoxelMap::VoxelMap(const Camera& camera, const DenseOptions& options) : camera_(camera), options_(options) {
-  const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
-  rays_.reserve(pixels);
-  block_of_pixel_.reserve(pixels);
-  const int columns = camera.width_px / kBlockPx, rows = camera.height_px / kBlockPx;
+VoxelMap::VoxelMap(const Camera& camera, const DenseOptions& options)
+    : camera_(camera), options_(options), free_(camera, options) {
+  rays_.reserve(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px));
   for (int y = 0; y < camera.height_px; ++y)
-    for (int x = 0; x < camera.width_px; ++x) {
-      const Eigen::Vector2d ideal = camera.undistort({x, y});
-      rays_.push_back(camera.back_project(ideal, 1).head<2>().cast<float>());
-      const double c = std::floor((ideal.x() + .5) / kBlockPx), r = std::floor((ideal.y() + .5) / kBlockPx);
-      const bool inside = c >= 0 && r >= 0 && c < columns && r < rows;
-      block_of_pixel_.push_back(inside ? static_cast<int>(r) * columns + static_cast<int>(c) : -1);
-    }
+    for (int x = 0; x < camera.width_px; ++x)
+      rays_.push_back(camera.back_project(camera.undistort({x, y}), 1).head<2>().cast<float>());
 }
 
-Status VoxelMap::integrate(const RgbdFrame& frame, const cv::Mat& moving, const SE3& world_from_camera) {
+Status VoxelMap::integrate(const RgbdFrame& frame, const cv::Mat& moving, const SE3& world_from_camera,
+                           const cv::Mat& labels) {
   const cv::Size size(camera_.width_px, camera_.height_px);
   const cv::Mat& picture = frame.colour.empty() ? frame.gray : frame.colour;
   const auto fits = [&](const cv::Mat& image, int one_type, int other_type) {
     return image.size() == size && (image.type() == one_type || image.type() == other_type);
   };
   if (!fits(frame.depth, CV_16UC1, CV_32FC1) || !fits(picture, CV_8UC3, CV_8UC1) ||
-      (!moving.empty() && !fits(moving, CV_8UC1, CV_8UC1)))
+      (!moving.empty() && !fits(moving, CV_8UC1, CV_8UC1)) || (!labels.empty() && !fits(labels, CV_8UC1, CV_8UC1)))
     return Error{ErrorCode::kInvalidInput,
                  fmt::format("dense map: an image of the frame at {:.6f} s has not the camera's size or another type",
                              frame.stamp.seconds())};
@@ -90,24 +62,9 @@ Status VoxelMap::integrate(const RgbdFrame& frame, const cv::Mat& moving, const 
     return Error{ErrorCode::kInvalidInput,
                  fmt::format("dense map: the pose at {:.6f} s is not finite", frame.stamp.seconds())};
   const cv::Mat depth_m = metres(frame.depth, static_cast<float>(1 / camera_.depth_units_per_m));
-  collect(usable_depth(depth_m, moving), frame, world_from_camera);
-  views_.push_back({world_from_camera.inverse().rotation_matrix().cast<float>(), world_from_camera.translation(),
-                    free_space(depth_m)});
+  collect(usable_depth(depth_m, moving), frame, world_from_camera, labels);
+  free_.add(depth_m, world_from_camera);
   return Status::success();
-}
-
-/// Per block the nearest depth in it and the blocks around it: at an outline a pixel's error of the pose must not count
-/// as free space. Not measured is 0, nearer than all.
-cv::Mat VoxelMap::free_space(const cv::Mat& depth_m) const {
-  constexpr float kNone = std::numeric_limits<float>::max();
-  cv::Mat blocks(depth_m.rows / kBlockPx, depth_m.cols / kBlockPx, CV_32FC1, cv::Scalar(kNone)), out;
-  float* nearest = blocks.ptr<float>();
-  const float* depth = depth_m.ptr<float>();
-  for (std::size_t i = 0; i < block_of_pixel_.size(); ++i)
-    if (const int b = block_of_pixel_[i]; b >= 0) nearest[b] = std::min(nearest[b], depth[i]);
-  blocks.setTo(0, blocks == kNone);
-  cv::erode(blocks, out, cv::Mat());
-  return out;
 }
 
 void VoxelMap::Voxel::add(const Voxel& other) {
@@ -117,13 +74,13 @@ void VoxelMap::Voxel::add(const Voxel& other) {
   frames += other.frames;
 }
 
-bool VoxelMap::is_before(const Voxel& a, const Voxel& b) { return a.place < b.place; }
+bool VoxelMap::is_before(const Voxel& a, const Voxel& b) { return a.key < b.key; }
 
-/// Of sorted voxels: makes one of all at one place.
-void VoxelMap::add_up(std::vector<Voxel>& voxels) {
+/// Of sorted voxels: makes one of all with one key.
+void VoxelMap::add_up(Voxels& voxels) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < voxels.size(); ++i) {
-    if (kept > 0 && voxels[kept - 1].place == voxels[i].place) {
+    if (kept > 0 && voxels[kept - 1].key == voxels[i].key) {
       voxels[kept - 1].add(voxels[i]);
     } else {
       voxels[kept++] = voxels[i];
@@ -132,14 +89,14 @@ void VoxelMap::add_up(std::vector<Voxel>& voxels) {
   voxels.erase(voxels.begin() + static_cast<std::ptrdiff_t>(kept), voxels.end());
 }
 
-void VoxelMap::reduce(std::vector<Voxel>& voxels) {
+void VoxelMap::reduce(Voxels& voxels) {
   // Short keys are sorted instead of voxels. Their numbers make the order, and with it the sums' last bits, certain.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> order(voxels.size());
-  for (std::size_t i = 0; i < voxels.size(); ++i) order[i] = {voxels[i].place, static_cast<std::uint32_t>(i)};
+  for (std::size_t i = 0; i < voxels.size(); ++i) order[i] = {voxels[i].key, static_cast<std::uint32_t>(i)};
   std::sort(order.begin(), order.end());
-  std::vector<Voxel> sorted;
+  Voxels sorted;
   sorted.reserve(voxels.size());
-  for (const auto& [place, i] : order) sorted.push_back(voxels[i]);
+  for (const auto& [key, i] : order) sorted.push_back(voxels[i]);
   add_up(sorted);
   voxels = std::move(sorted);
 }
@@ -167,7 +124,8 @@ cv::Mat VoxelMap::usable_depth(const cv::Mat& depth_m, const cv::Mat& moving) co
   return out;
 }
 
-void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3& world_from_camera) {
+void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3& world_from_camera,
+                       const cv::Mat& labels) {
   const Eigen::Matrix3f rotation = world_from_camera.rotation().toRotationMatrix().cast<float>();
   const Eigen::Vector3d origin = world_from_camera.translation();
   const double per_m = 1 / options_.voxel_m;
@@ -175,7 +133,7 @@ void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3
   const std::uint8_t* pixels = picture.data;
   const std::size_t pixel_step = picture.step[0];
   const int channels = picture.channels();
-  std::vector<Voxel> fresh;
+  Voxels fresh;
   for (int y = 0; y < depth_m.rows; ++y) {
     const float* depth = depth_m.ptr<float>(y);
     for (int x = 0; x < depth_m.cols; ++x) {
@@ -185,23 +143,38 @@ void VoxelMap::collect(const cv::Mat& depth_m, const RgbdFrame& frame, const SE3
           origin + (rotation * Eigen::Vector3f(ray.x() * depth[x], ray.y() * depth[x], depth[x])).cast<double>();
       const Eigen::Array3d cell = (p.array() * per_m).floor();
       if ((cell.abs() >= static_cast<double>(kHalf)).any()) continue;
-      std::uint64_t place = 0;
+      std::uint64_t key = 0;
       for (int axis = 0; axis < 3; ++axis)
-        place = place << kBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell[axis]) + kHalf);
+        key = key << kBits | static_cast<std::uint64_t>(static_cast<std::int64_t>(cell[axis]) + kHalf);
+      key = key << kLabelBits | (labels.empty() ? std::uint8_t{0} : labels.at<std::uint8_t>(y, x));
       const std::uint8_t* bgr = pixels + static_cast<std::size_t>(y) * pixel_step + x * channels;
       const Eigen::Vector3f colour(bgr[0], bgr[channels / 2], bgr[channels - 1]);
       const Eigen::Vector3f within = (p - cell.matrix() * options_.voxel_m).cast<float>();
-      if (!fresh.empty() && fresh.back().place == place)  // as the pixel beside it: half of the sorting saved
-        fresh.back().add({place, within, colour, 1, 0});
+      if (!fresh.empty() && fresh.back().key == key)  // as the pixel beside it: half of the sorting saved
+        fresh.back().add({key, within, colour, 1, 0});
       else
-        fresh.push_back({place, within, colour, 1, 1});
+        fresh.push_back({key, within, colour, 1, 1});
     }
   }
   reduce(fresh);
-  for (Voxel& v : fresh) v.frames = 1;  // its pixels are of one frame
-  pending_.insert(pending_.end(), fresh.begin(), fresh.end());
+  for (Voxels::const_iterator next = fresh.begin(); next != fresh.end();) {
+    pending_.push_back(next_place(next, fresh.end(), &Voxel::pixels));
+    pending_.back().frames = 1;  // its pixels are of one frame
+  }
   // Merged when as many wait as there are: each voxel is moved a few times only, however many frames come.
   if (pending_.size() > std::max(kLeastPending, voxels_.size())) merge();
+}
+
+/// All voxels at one place in one, with the label of the most votes. @param from the first of them; then behind them.
+VoxelMap::Voxel VoxelMap::next_place(Voxels::const_iterator& from, Voxels::const_iterator end,
+                                     std::uint32_t Voxel::*votes) {
+  Voxel joined = *from;
+  std::uint32_t most = joined.*votes;
+  for (++from; from != end && place_of(from->key) == place_of(joined.key); ++from) {
+    if ((*from).*votes > most) joined.key = from->key, most = (*from).*votes;
+    joined.add(*from);
+  }
+  return joined;
 }
 
 void VoxelMap::merge() {
@@ -209,7 +182,7 @@ void VoxelMap::merge() {
   if (voxels_.empty()) {
     voxels_.swap(pending_);
   } else {
-    std::vector<Voxel> both;
+    Voxels both;
     both.reserve(voxels_.size() + pending_.size());
     std::merge(voxels_.begin(), voxels_.end(), pending_.begin(), pending_.end(), std::back_inserter(both), is_before);
     add_up(both);
@@ -218,42 +191,49 @@ void VoxelMap::merge() {
   pending_.clear();
 }
 
-std::uint32_t VoxelMap::count_views_through(const Eigen::Vector3d& point) const {
-  const auto fx = static_cast<float>(camera_.fx_px), fy = static_cast<float>(camera_.fy_px);
-  const auto cx = static_cast<float>(camera_.cx_px + .5), cy = static_cast<float>(camera_.cy_px + .5);
-  const auto least_m = static_cast<float>(options_.min_depth_m), share = static_cast<float>(options_.free_share),
-             margin_m = static_cast<float>(options_.free_margin_m);
-  std::uint32_t count = 0;
-  for (const View& view : views_) {
-    const Eigen::Vector3f p = view.rotation * (point - view.centre_m).cast<float>();
-    if (!(p.z() > least_m)) continue;
-    const float c = (p.x() / p.z() * fx + cx) / kBlockPx, r = (p.y() / p.z() * fy + cy) / kBlockPx;
-    if (!(c >= 0 && r >= 0 && c < static_cast<float>(view.free_m.cols) && r < static_cast<float>(view.free_m.rows)))
-      continue;
-    count += view.free_m.at<float>(static_cast<int>(r), static_cast<int>(c)) > p.z() * (1 + share) + margin_m;
-  }
-  return count;
-}
-
 std::vector<CloudPoint> VoxelMap::points() {
   merge();
   std::vector<CloudPoint> out;
   out.reserve(voxels_.size());
-  for (const Voxel& v : voxels_) {
+  for (Voxels::const_iterator next = voxels_.begin(); next != voxels_.end();) {
+    const Voxel v = next_place(next, voxels_.end(), &Voxel::frames);
     if (v.frames < static_cast<std::uint32_t>(options_.least_frames)) continue;
     const Eigen::Vector3d position =
-        corner_m(v.place, options_.voxel_m) + (v.position_sum_m / static_cast<float>(v.pixels)).cast<double>();
-    const std::uint32_t through = count_views_through(position);
+        corner_m(v.key, options_.voxel_m) + (v.position_sum_m / static_cast<float>(v.pixels)).cast<double>();
+    const std::uint32_t through = free_.count_views_through(position);
     if (through >= static_cast<std::uint32_t>(options_.seen_through) &&
         through >= options_.seen_through_share * v.frames)
       continue;
     const Eigen::Array3f bgr = (v.colour_sum / static_cast<float>(v.pixels)).array().round();
     CloudPoint point;
     point.position_m = position.cast<float>();
+    point.label = static_cast<std::uint8_t>(v.key);
     for (int k = 0; k < 3; ++k) point.rgb[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(bgr[2 - k]);
     out.push_back(point);
   }
   return out;
+}
+
+std::vector<OctreeLeaf> VoxelMap::octree(std::span<const CloudPoint> points) const {
+  std::vector<OctreeCode> occupied;
+  for (const CloudPoint& point : points) {
+    const Eigen::Array3d cube = (point.position_m.cast<double>().array() / options_.octree_m).floor();
+    if ((cube.abs() > kOctreeReach).any()) continue;
+    const std::optional<OctreeCode> code = octree_code(cube.cast<int>().matrix());
+    if (code && (occupied.empty() || occupied.back() != *code)) occupied.push_back(*code);
+  }
+  std::sort(occupied.begin(), occupied.end());
+  occupied.erase(std::unique(occupied.begin(), occupied.end()), occupied.end());
+  const std::vector<OctreeCode> free = free_.octree_cubes();
+  std::vector<OctreeLeaf> leaves;
+  leaves.reserve(occupied.size() + free.size());
+  auto next = occupied.begin();
+  for (const OctreeCode code : free) {
+    for (; next != occupied.end() && *next < code; ++next) leaves.push_back({*next, true});
+    if (next == occupied.end() || *next != code) leaves.push_back({code, false});
+  }
+  for (; next != occupied.end(); ++next) leaves.push_back({*next, true});
+  return leaves;
 }
 
 }  // namespace semvslam

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -99,6 +100,30 @@ TEST(VoxelMap, AGhostGoesWhenOthersLookThroughItAndTheWallBehindItStays) {
   }));
 }
 
+TEST(VoxelMap, TheOctreeIsOccupiedWherePointsAreAndFreeBeforeThem) {
+  VoxelMap map(small_camera(), {});
+  ASSERT_TRUE(map.integrate(wall({60, 40, 40, 40}), {}, SE3()));
+  ASSERT_TRUE(map.integrate(wall(), {}, SE3()));
+  // The box lies in the layer that begins at 1 m, the wall in that at 2 m. What one key frame looked through is not yet
+  // taken from the points, and occupied.
+  const auto cubes = [&](int z, bool occupied) {
+    std::set<OctreeCode> layer;
+    for (int x = -30; x < 30; ++x)
+      for (int y = -30; y < 30; ++y) layer.insert(octree_code({x, y, z}).value());
+    return std::ranges::count_if(map.octree(map.points()), [&](const OctreeLeaf& leaf) {
+      return leaf.occupied == occupied && layer.contains(leaf.code);
+    });
+  };
+  const auto box = cubes(20, true), beside = cubes(20, false), wall_cubes = cubes(40, true);
+  EXPECT_NEAR(static_cast<double>(box), 5 * 5, 12);  // 0.27 m less its edges
+  EXPECT_NEAR(static_cast<double>(wall_cubes), 43 * 33, 100);
+  EXPECT_EQ(cubes(40, false), 0);
+  EXPECT_NEAR(static_cast<double>(box + beside), 21 * 16, 40);
+  ASSERT_TRUE(map.integrate(wall(), {}, SE3()));
+  EXPECT_EQ(cubes(20, true), 0);
+  EXPECT_EQ(cubes(20, false), box + beside);
+}
+
 TEST(VoxelMap, WhatStaysForLongIsNotTakenAwayByTwoWrongViews) {
   VoxelMap map(small_camera(), {});
   for (int k = 0; k < 6; ++k) ASSERT_TRUE(map.integrate(wall({60, 40, 40, 40}), {}, SE3()));
@@ -139,6 +164,45 @@ TEST(VoxelMap, RareVoxelsGoWhereSeveralFramesAreWanted) {
   EXPECT_FALSE(map.points().empty());
 }
 
+TEST(VoxelMap, APointHasTheLabelThatMostKeyFramesSawThere) {
+  // Side by side: seen as a 7 by two of three frames, by one of them, as a 7 by one and as a 9 by two, never.
+  const std::array<cv::Rect, 4> parts{cv::Rect(0, 0, 40, 120), {40, 0, 40, 120}, {80, 0, 40, 120}, {120, 0, 40, 120}};
+  const std::array<std::array<int, 4>, 3> labels{{{7, 7, 7, 0}, {7, 0, 9, 0}, {0, 0, 9, 0}}};
+  VoxelMap map(small_camera(), {});
+  for (const auto& of_parts : labels) {
+    cv::Mat image(120, 160, CV_8UC1);
+    for (std::size_t k = 0; k < parts.size(); ++k) image(parts[k]).setTo(of_parts[k]);
+    ASSERT_TRUE(map.integrate(wall(), {}, SE3(), image));
+  }
+  std::array<std::size_t, 4> points{};
+  for (const CloudPoint& p : map.points()) {
+    const double column = 79.5 + 75 * static_cast<double>(p.position_m.x());
+    if (std::abs(std::remainder(column, 40)) < 2) continue;  // the voxel may belong to two parts
+    const auto part = static_cast<std::size_t>(column / 40);
+    ++points[part];
+    ASSERT_EQ(p.label, (std::array<int, 4>{7, 0, 9, 0}[part])) << p.position_m.transpose();
+  }
+  for (const std::size_t count : points) EXPECT_GT(count, 3000u);
+}
+
+TEST(VoxelMap, LabelsChangeNothingElse) {
+  DenseOptions coarse;
+  coarse.voxel_m = .05;
+  VoxelMap plain(small_camera(), coarse), labelled(small_camera(), coarse);
+  cv::Mat image = cv::Mat::zeros(120, 160, CV_8UC1);
+  image(cv::Rect(50, 30, 33, 41)).setTo(3);
+  for (int k = 0; k < 2; ++k) {
+    ASSERT_TRUE(plain.integrate(wall({60, 40, 40, 40}), {}, SE3()));
+    ASSERT_TRUE(labelled.integrate(wall({60, 40, 40, 40}), {}, SE3(), image));
+  }
+  const std::vector<CloudPoint> a = plain.points(), b = labelled.points();
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    ASSERT_LT((a[k].position_m - b[k].position_m).norm(), 1e-5f);
+    ASSERT_EQ(a[k].rgb, b[k].rgb);
+  }
+}
+
 TEST(VoxelMap, DepthInMetresWithNanAndGreyPictures) {
   RgbdFrame frame = wall();
   frame.depth.convertTo(frame.depth, CV_32F, 1e-3);
@@ -160,6 +224,8 @@ TEST(VoxelMap, WhatDoesNotFitIsRefusedAndAddsNothing) {
   const Status mask = map.integrate(frame, cv::Mat::zeros(10, 10, CV_8UC1), SE3());
   ASSERT_FALSE(mask);
   EXPECT_THAT(mask.error().message, HasSubstr("size"));
+  EXPECT_FALSE(map.integrate(frame, {}, SE3(), cv::Mat::zeros(10, 10, CV_8UC1)));
+  EXPECT_FALSE(map.integrate(frame, {}, SE3(), cv::Mat::zeros(120, 160, CV_16UC1)));
   frame.depth.convertTo(frame.depth, CV_8U);
   EXPECT_FALSE(map.integrate(frame, {}, SE3()));
   frame.depth = wall().depth.rowRange(0, 50);
