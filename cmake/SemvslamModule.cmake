@@ -16,14 +16,14 @@ if(SEMVSLAM_SANITIZE)
   target_link_options(semvslam_build_flags INTERFACE -fsanitize=${SEMVSLAM_SANITIZE})
 endif()
 
-# semvslam_embed(VARIABLE STRUCT FOLDER NAME...): C++ initialisers STRUCT{"NAME", R"yaml(text of FOLDER/NAME.yaml)yaml"}. Files that
-# are part of the program: no path to get wrong, none to forget when installing.
-function(semvslam_embed variable struct folder)
+# semvslam_embed(VARIABLE STRUCT FOLDER EXTENSION NAME...): C++ initialisers STRUCT{"NAME", R"file(text of FOLDER/NAME.EXTENSION)file"}.
+# Files that are part of the program: no path to get wrong, none to forget when installing.
+function(semvslam_embed variable struct folder extension)
   set(all "")
   foreach(name ${ARGN})
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/${name}.yaml)
-    file(READ ${folder}/${name}.yaml text)
-    string(APPEND all "    ${struct}{\"${name}\", R\"yaml(${text})yaml\"},\n")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${folder}/${name}.${extension})
+    file(READ ${folder}/${name}.${extension} text)
+    string(APPEND all "    ${struct}{\"${name}\", R\"file(${text})file\"},\n")
   endforeach()
   set(${variable} "${all}" PARENT_SCOPE)
 endfunction()

@@ -29,7 +29,8 @@ ALLOWED = {
     "mapping": {"feature", "place", "map", "solve", "geometry"},
     "dense": {"data", "geometry"},
     "pipeline": CORE,
-    "apps": {"pipeline", "eval", "render", "data"} | CORE,
+    "web": {"eval", "data", "geometry"},
+    "apps": {"pipeline", "eval", "render", "web", "data"} | CORE,
 }
 
 # library -> (how its headers begin, modules whose sources may include them). `map` and `pipeline` see frames through data.
@@ -40,7 +41,8 @@ FOREIGN = {
     "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),
     "CLI11": (re.compile(r"CLI/"), {"apps"}),
-    "nlohmann-json": (re.compile(r"nlohmann/"), {"apps", "eval", "semantic"}),
+    "cpp-httplib": (re.compile(r"httplib\.h"), {"web"}),
+    "nlohmann-json": (re.compile(r"nlohmann/"), {"apps", "eval", "semantic", "web"}),
     "yaml-cpp": (re.compile(r"yaml-cpp/"), {"base", "data", "semantic"}),
 }
 # Tests and benchmarks may go further: they build their inputs and references with whatever they like.

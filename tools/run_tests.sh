@@ -96,8 +96,8 @@ run_stage() {
       ;;
     threads)
       say "thread sanitizer"
-      if build_folder tsan "(base|data|render|dynamic|tracking|pipeline|apps)_test|semvslam_program"; then
-        run_ctest "$root/build/tsan" -R '^(base|data|render|dynamic|tracking|pipeline|apps)\.|^house\.program$'
+      if build_folder tsan "(base|data|render|dynamic|tracking|pipeline|web|apps)_test|semvslam_program"; then
+        run_ctest "$root/build/tsan" -R '^(base|data|render|dynamic|tracking|pipeline|web|apps)\.|^house\.program$'
       fi
       ;;
     fuzz)

@@ -1,6 +1,11 @@
 #include "semvslam/apps/interrupt.h"
 
+#include <sys/signalfd.h>
+#include <unistd.h>
+
 #include <atomic>
+#include <cerrno>
+#include <system_error>
 
 namespace semvslam {
 namespace {
@@ -29,5 +34,25 @@ InterruptGuard::~InterruptGuard() {
 }
 
 int InterruptGuard::received() { return received_signal; }
+
+InterruptDescriptor::InterruptDescriptor() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, &old_mask_);
+  descriptor_ = ::signalfd(-1, &signals, SFD_NONBLOCK | SFD_CLOEXEC);
+  if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), "signalfd");
+}
+
+InterruptDescriptor::~InterruptDescriptor() {
+  ::close(descriptor_);
+  pthread_sigmask(SIG_SETMASK, &old_mask_, nullptr);
+}
+
+int InterruptDescriptor::received() const {
+  signalfd_siginfo info{};
+  return ::read(descriptor_, &info, sizeof info) == sizeof info ? static_cast<int>(info.ssi_signo) : 0;
+}
 
 }  // namespace semvslam

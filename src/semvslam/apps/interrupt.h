@@ -21,4 +21,22 @@ class InterruptGuard {
   }, old_terminate_{};
 };
 
+/// While it lives, SIGINT and SIGTERM do nothing but make a descriptor readable: for threads that wait for other
+/// descriptors too. To be made before other threads are, which must not receive them.
+class InterruptDescriptor {
+ public:
+  InterruptDescriptor();
+  ~InterruptDescriptor();
+  InterruptDescriptor(const InterruptDescriptor&) = delete;
+  InterruptDescriptor& operator=(const InterruptDescriptor&) = delete;
+
+  int descriptor() const { return descriptor_; }
+  /// The signal that arrived; 0 = none. Does not wait.
+  int received() const;
+
+ private:
+  sigset_t old_mask_{};
+  int descriptor_ = -1;
+};
+
 }  // namespace semvslam

@@ -37,5 +37,22 @@ TEST(InterruptGuard, GivesTheOldHandlersBack) {
   EXPECT_EQ(calls, 1);
 }
 
+TEST(InterruptDescriptor, HoldsASignalBackAndTellsIt) {
+  const InterruptDescriptor descriptor;
+  EXPECT_EQ(descriptor.received(), 0);
+  std::raise(SIGTERM);
+  EXPECT_EQ(descriptor.received(), SIGTERM);
+  EXPECT_EQ(descriptor.received(), 0);
+}
+
+TEST(InterruptDescriptorDeathTest, AfterItSignalsEndTheProcessAgain) {
+  EXPECT_EXIT(
+      {
+        { const InterruptDescriptor descriptor; }
+        std::raise(SIGINT);
+      },
+      ::testing::KilledBySignal(SIGINT), "");
+}
+
 }  // namespace
 }  // namespace semvslam
