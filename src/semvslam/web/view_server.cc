@@ -41,8 +41,8 @@ void refuse(httplib::Response& response, int status, const std::string& why) {
 }  // namespace
 
 struct ViewServer::Parts {
-  Parts(std::filesystem::path folder_, ViewOptions view_)
-      : folder(std::move(folder_)), view(std::move(view_)), feed(folder) {}
+  Parts(std::filesystem::path run_folder, ViewOptions options)
+      : folder(std::move(run_folder)), view(std::move(options)), feed(folder) {}
 
   Result<Scene> scene() const {
     Scene out;
