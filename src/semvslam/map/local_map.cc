@@ -39,12 +39,14 @@ KeyFrameId LocalMap::nearest(const SE3& camera_from_world) const {
 
 std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, const LocalMapOptions& options,
                                           const std::vector<KeyFrameId>& except) {
-  const SE3& pose = map.key_frame(reference)->camera_from_world;
+  const KeyFrame& from = *map.key_frame(reference);
+  const SE3& pose = from.camera_from_world;
   const Eigen::Vector3d centre = pose.inverse().translation();
   const Eigen::Vector3d direction = viewing_direction(pose);
   const double min_cosine = std::cos(options.nearby_angle_deg * std::numbers::pi / 180.0);
   std::vector<std::pair<double, KeyFrameId>> near;
   for (const auto& [id, key_frame] : map.key_frames()) {
+    if (key_frame.sub_map != from.sub_map) continue;
     if (id == reference || std::find(except.begin(), except.end(), id) != except.end()) continue;
     const double distance = (key_frame.camera_from_world.inverse().translation() - centre).norm();
     if (distance > options.nearby_distance_m) continue;
@@ -62,6 +64,7 @@ std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, 
 std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId reference, const LocalMapOptions& options) {
   auto local = std::make_shared<LocalMap>();
   local->reference = reference;
+  local->sub_map = map.key_frame(reference)->sub_map;
   if (reference >= map.first_of_session()) local->reference_frame = map.key_frame(reference)->frame;
   std::vector<KeyFrameId> window{reference};
   for (const Covisible& c : map.covisible(reference, 1)) {

@@ -26,6 +26,7 @@ struct LocalMap {
   };
 
   KeyFrameId reference;                  // the key frame it was made around
+  SubMapId sub_map;                      // of the reference, and of all else
   FrameId reference_frame;               // the frame that the reference was; invalid: one of an earlier session
   int reference_matches = 0;             // landmarks that the reference sees
   std::vector<Point> points;             // ascending by id
@@ -49,7 +50,7 @@ struct LocalMapOptions {
 /// Copies the neighbourhood of `reference` out of the map.
 std::shared_ptr<const LocalMap> make_local_map(const Map& map, KeyFrameId reference, const LocalMapOptions& options);
 
-/// Key frames within the distance and angle of `reference` that are not in `except`, nearest first.
+/// Key frames of its sub-map within the distance and angle of `reference` that are not in `except`, nearest first.
 std::vector<KeyFrameId> nearby_key_frames(const Map& map, KeyFrameId reference, const LocalMapOptions& options,
                                           const std::vector<KeyFrameId>& except);
 

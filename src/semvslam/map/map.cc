@@ -16,6 +16,7 @@ Result<Map> Map::restore(std::shared_ptr<const ObservationModel> model, MapConte
     if (id >= content.next_key_frame)
       return invalid(fmt::format("key frame {} has an id that was never given out", id.value));
     key_frame.landmarks.assign(key_frame.features->size(), LandmarkId());
+    map.enlist(id, key_frame.sub_map);
     if (!map.key_frames_.emplace(id, std::move(key_frame)).second)
       return invalid(fmt::format("key frame {} is there twice", id.value));
   }
@@ -44,12 +45,19 @@ Result<Map> Map::restore(std::shared_ptr<const ObservationModel> model, MapConte
 }
 
 KeyFrameId Map::add_key_frame(FrameId frame, TimeStamp stamp, const SE3& camera_from_world,
-                              std::shared_ptr<const FrameFeatures> features) {
+                              std::shared_ptr<const FrameFeatures> features, SubMapId sub_map) {
   const KeyFrameId id(next_key_frame_++);
-  KeyFrame key_frame{id, frame, stamp, camera_from_world, std::move(features), {}};
+  KeyFrame key_frame{id, frame, stamp, camera_from_world, std::move(features), {}, sub_map};
   key_frame.landmarks.resize(key_frame.features->size());
   key_frames_.emplace(id, std::move(key_frame));
+  enlist(id, sub_map);
   return id;
+}
+
+void Map::enlist(KeyFrameId id, SubMapId sub_map) {
+  const auto first = sub_maps_.try_emplace(sub_map, id).first;
+  first->second = std::min(first->second, id);
+  next_sub_map_ = std::max(next_sub_map_, sub_map.value + 1);
 }
 
 void Map::remove_key_frame(KeyFrameId id, KeyFrameId anchor) {
@@ -60,7 +68,27 @@ void Map::remove_key_frame(KeyFrameId id, KeyFrameId anchor) {
   for (const LandmarkId landmark : seen)
     if (landmark.valid()) remove_observation(landmark, id);
   removed_key_frames_[id] = {anchor, it->second.camera_from_world * key_frames_.at(anchor).camera_from_world.inverse()};
+  const SubMapId sub_map = it->second.sub_map;
   key_frames_.erase(it);
+  if (sub_maps_.at(sub_map) != id) return;
+  sub_maps_.erase(sub_map);
+  if (const std::vector<KeyFrameId> left = key_frames_of(sub_map); !left.empty()) enlist(left.front(), sub_map);
+}
+
+void Map::join(SubMapId from, SubMapId into, const SE3& into_from_from) {
+  if (from == into || !sub_maps_.contains(from) || !sub_maps_.contains(into))
+    throw std::logic_error(fmt::format("Map::join: {} into {}", from.value, into.value));
+  const std::vector<LandmarkId> landmarks = landmark_ids(from);
+  const SE3 from_from_into = into_from_from.inverse();
+  for (const KeyFrameId id : key_frames_of(from)) {
+    KeyFrame& key_frame = key_frames_.at(id);
+    key_frame.camera_from_world = key_frame.camera_from_world * from_from_into;
+    key_frame.sub_map = into;
+    enlist(id, into);
+  }
+  sub_maps_.erase(from);
+  for (const LandmarkId id : landmarks) set_position(id, into_from_from * landmarks_.at(id).position);
+  for (const LandmarkId id : landmarks) refresh_geometry(id);
 }
 
 LandmarkId Map::add_landmark(const Eigen::Vector3d& position, KeyFrameId key_frame, std::uint32_t feature) {
@@ -190,15 +218,26 @@ LandmarkId Map::resolve(LandmarkId id) const {
 
 std::vector<std::pair<LandmarkId, LandmarkId>> Map::recent_fusions() const { return {fused_.begin(), fused_.end()}; }
 
-std::optional<SE3> Map::camera_from_world(KeyFrameId id) const {
+std::optional<Map::Anchored> Map::anchor_of(KeyFrameId id) const {
   SE3 camera_from_anchor;
   while (true) {
-    if (const KeyFrame* k = key_frame(id)) return camera_from_anchor * k->camera_from_world;
+    if (const KeyFrame* k = key_frame(id)) return Anchored{*k, camera_from_anchor};
     const auto it = removed_key_frames_.find(id);
     if (it == removed_key_frames_.end()) return std::nullopt;
     camera_from_anchor = camera_from_anchor * it->second.camera_from_anchor;
     id = it->second.anchor;
   }
+}
+
+std::optional<SE3> Map::camera_from_world(KeyFrameId id) const {
+  const std::optional<Anchored> anchored = anchor_of(id);
+  if (!anchored) return std::nullopt;
+  return anchored->camera_from_key_frame * anchored->key_frame.camera_from_world;
+}
+
+SubMapId Map::sub_map_of(KeyFrameId id) const {
+  const std::optional<Anchored> anchored = anchor_of(id);
+  return anchored ? anchored->key_frame.sub_map : SubMapId();
 }
 
 std::vector<Covisible> Map::covisible(KeyFrameId id, int min_shared) const {
@@ -217,18 +256,33 @@ std::vector<Covisible> Map::covisible(KeyFrameId id, int min_shared) const {
   return result;
 }
 
-std::vector<LandmarkId> Map::landmark_ids() const {
+std::vector<KeyFrameId> Map::key_frames_of(SubMapId sub_map) const {
+  std::vector<KeyFrameId> ids;
+  for (const auto& [id, key_frame] : key_frames_)
+    if (key_frame.sub_map == sub_map) ids.push_back(id);
+  return ids;
+}
+
+Map Map::part(SubMapId sub_map) const {
+  Map copy(*this);
+  std::erase_if(copy.landmarks_, [&](const auto& entry) { return sub_map_of(entry.second) != sub_map; });
+  std::erase_if(copy.key_frames_, [&](const auto& entry) { return entry.second.sub_map != sub_map; });
+  std::erase_if(copy.sub_maps_, [&](const auto& entry) { return entry.first != sub_map; });
+  return copy;
+}
+
+std::vector<LandmarkId> Map::landmark_ids(std::optional<SubMapId> sub_map) const {
   std::vector<LandmarkId> ids;
   ids.reserve(landmarks_.size());
-  for (const auto& [id, landmark] : landmarks_) ids.push_back(id);
+  for (const auto& [id, landmark] : landmarks_)
+    if (!sub_map || sub_map_of(landmark) == *sub_map) ids.push_back(id);
   std::sort(ids.begin(), ids.end());
   return ids;
 }
 
-std::vector<Eigen::Vector3d> Map::landmark_positions() const {
+std::vector<Eigen::Vector3d> Map::landmark_positions(std::optional<SubMapId> sub_map) const {
   std::vector<Eigen::Vector3d> positions;
-  positions.reserve(landmarks_.size());
-  for (const LandmarkId id : landmark_ids()) positions.push_back(landmarks_.at(id).position);
+  for (const LandmarkId id : landmark_ids(sub_map)) positions.push_back(landmarks_.at(id).position);
   return positions;
 }
 
@@ -249,6 +303,9 @@ Status Map::check_invariants() const {
     if (key_frame.id != id) return broken(fmt::format("key frame {} stored under {}", key_frame.id.value, id.value));
     if (!key_frame.camera_from_world.is_finite())
       return broken(fmt::format("key frame {} has a pose that is not finite", id.value));
+    const auto first = sub_maps_.find(key_frame.sub_map);
+    if (first == sub_maps_.end() || first->second > id)
+      return broken(fmt::format("sub-map {} does not know its first key frame {}", key_frame.sub_map.value, id.value));
     if (key_frame.landmarks.size() != key_frame.features->size())
       return broken(fmt::format("key frame {} has {} landmark slots for {} features", id.value,
                                 key_frame.landmarks.size(), key_frame.features->size()));
@@ -275,6 +332,8 @@ Status Map::check_invariants() const {
       if (!key_frames_.contains(point.observations[i].key_frame))
         return broken(fmt::format("landmark {} is seen by key frame {} which is gone", id.value,
                                   point.observations[i].key_frame.value));
+      if (key_frames_.at(point.observations[i].key_frame).sub_map != sub_map_of(point))
+        return broken(fmt::format("landmark {} is seen in two sub-maps", id.value));
     }
   }
   if (from_key_frames != from_landmarks)

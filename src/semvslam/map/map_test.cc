@@ -13,9 +13,10 @@ class MapTest : public testing::Test {
  protected:
   MapTest() : map(std::make_shared<ObservationModel>(vga(), NoiseModel{}, level_scales(OrbOptions{}))) {}
 
-  KeyFrameId add_key_frame(double x_m, int features = 6) {
+  KeyFrameId add_key_frame(double x_m, SubMapId sub_map = SubMapId(0)) {
+    constexpr int kFeatures = 6;
     auto f = std::make_shared<FrameFeatures>();
-    for (int i = 0; i < features; ++i) {
+    for (int i = 0; i < kFeatures; ++i) {
       f->orb.keypoints.push_back({100.f + 50.f * static_cast<float>(i), 240.f, 1.f, 0.f, 0});
       f->orb.descriptors.push_back({static_cast<std::uint64_t>(i), 0, 0, 0});
       f->x_px.push_back(f->orb.keypoints.back().x_px);
@@ -23,7 +24,7 @@ class MapTest : public testing::Test {
       f->depth_m.push_back(2.f);
     }
     return map.add_key_frame(FrameId(static_cast<std::uint32_t>(map.key_frames().size())), TimeStamp{},
-                             SE3(Eigen::Quaterniond::Identity(), {-x_m, 0, 0}), f);
+                             SE3(Eigen::Quaterniond::Identity(), {-x_m, 0, 0}), f, sub_map);
   }
   void expect_consistent() const {
     const Status status = map.check_invariants();
@@ -104,6 +105,48 @@ TEST_F(MapTest, ARemovedKeyFrameKeepsItsPoseRelativeToItsAnchor) {
   EXPECT_NEAR(map.camera_from_world(b)->translation().y(), 0.25, 1e-12);
   EXPECT_FALSE(map.camera_from_world(KeyFrameId(99)).has_value());
   EXPECT_THROW(map.remove_key_frame(c, a), std::logic_error);
+}
+
+TEST_F(MapTest, JoiningMovesASubMapWithAllThatIsInItOrWas) {
+  const KeyFrameId a = add_key_frame(0), b = add_key_frame(0, SubMapId(1)), gone = add_key_frame(0.5, SubMapId(1));
+  const LandmarkId of_a = map.add_landmark({0, 0, 2}, a, 0), of_b = map.add_landmark({0, 0, 2}, b, 0);
+  map.remove_key_frame(gone, b);
+  expect_consistent();
+  EXPECT_THAT(map.sub_maps(), testing::ElementsAre(std::pair(SubMapId(0), a), std::pair(SubMapId(1), b)));
+  EXPECT_EQ(map.sub_map_of(gone), SubMapId(1));
+  EXPECT_FALSE(map.sub_map_of(KeyFrameId(99)).valid());
+
+  const SE3 into_from_from(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ())), {0, 3, 0});
+  map.join(SubMapId(1), SubMapId(0), into_from_from);
+  expect_consistent();
+  EXPECT_THAT(map.sub_maps(), testing::ElementsAre(std::pair(SubMapId(0), a)));
+  EXPECT_EQ(map.next_sub_map(), SubMapId(2));
+  EXPECT_EQ(map.sub_map_of(gone), SubMapId(0));
+  EXPECT_LT((map.camera_from_world(b)->inverse().translation() - Eigen::Vector3d(0, 3, 0)).norm(), 1e-12);
+  EXPECT_LT((map.camera_from_world(gone)->inverse().translation() - Eigen::Vector3d(0, 3.5, 0)).norm(), 1e-12);
+  EXPECT_LT((map.landmark(of_b)->position - Eigen::Vector3d(0, 3, 2)).norm(), 1e-12);
+  EXPECT_EQ(map.landmark(of_a)->position, Eigen::Vector3d(0, 0, 2));
+  EXPECT_THROW(map.join(SubMapId(1), SubMapId(0), SE3()), std::logic_error);
+}
+
+TEST_F(MapTest, APartHoldsOneSubMapAlone) {
+  const KeyFrameId a = add_key_frame(0), b = add_key_frame(0, SubMapId(1)), c = add_key_frame(0.1);
+  const LandmarkId of_a = map.add_landmark({0, 0, 2}, a, 0), of_b = map.add_landmark({0, 0, 3}, b, 0);
+  map.add_observation(of_a, c, 1);
+  EXPECT_THAT(map.key_frames_of(SubMapId(0)), testing::ElementsAre(a, c));
+  EXPECT_THAT(map.landmark_ids(SubMapId(1)), testing::ElementsAre(of_b));
+  const Map part = map.part(SubMapId(1));
+  EXPECT_TRUE(part.check_invariants().ok());
+  EXPECT_EQ(part.key_frames().size(), 1u);
+  EXPECT_EQ(part.landmark_positions(), map.landmark_positions(SubMapId(1)));
+  EXPECT_EQ(part.next_key_frame(), map.next_key_frame());
+  EXPECT_TRUE(map.part(SubMapId(7)).key_frames().empty());
+}
+
+TEST_F(MapTest, ALandmarkOfTwoSubMapsIsAContradiction) {
+  const KeyFrameId a = add_key_frame(0), b = add_key_frame(0, SubMapId(1));
+  map.add_observation(map.add_landmark({0, 0, 2}, a, 0), b, 0);
+  EXPECT_THAT(map.check_invariants().error().message, testing::HasSubstr("two sub-maps"));
 }
 
 TEST_F(MapTest, CovisibleKeyFramesAreRankedBySharedLandmarks) {

@@ -5,9 +5,13 @@
 namespace semvslam {
 
 KeyFrameId first_recent(const Map& map, KeyFrameId id, int newest) {
-  auto first = map.key_frames().find(id);
-  for (int i = 0; i < newest && first != map.key_frames().begin(); ++i) --first;
-  return first->first;
+  const SubMapId sub_map = map.key_frame(id)->sub_map;
+  KeyFrameId first = id;
+  for (auto it = map.key_frames().find(id); newest > 0 && it != map.key_frames().begin();) {
+    --it;
+    if (it->second.sub_map == sub_map) first = it->first, --newest;
+  }
+  return first;
 }
 
 std::vector<LandmarkId> landmarks_before(const Map& map, const std::vector<KeyFrameId>& key_frames, KeyFrameId before) {

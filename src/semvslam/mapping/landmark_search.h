@@ -19,7 +19,8 @@ struct LandmarkMatches {
   std::size_t size() const { return landmarks.size(); }
 };
 
-/// The first of so many newest key frames up to `id`: what none of them sees belongs to an earlier visit.
+/// The first of so many newest key frames of its sub-map up to `id`: what none of them sees belongs to an earlier
+/// visit.
 KeyFrameId first_recent(const Map& map, KeyFrameId id, int newest);
 /// Landmarks of the key frames that no key frame from `before` on sees.
 std::vector<LandmarkId> landmarks_before(const Map& map, const std::vector<KeyFrameId>& key_frames, KeyFrameId before);

@@ -34,35 +34,35 @@ void LoopOptions::add_to(ConfigSchema& s) {
   s.add("mapping.loop.drift_allowance_deg", &drift_allowance_deg, {0, 180}, "that much is always believed, degrees");
 }
 
+bool agree(const SE3& a, const SE3& b, const SE3& camera_from_world, const LoopOptions& options) {
+  const SE3 difference = camera_from_world * a.inverse() * b * camera_from_world.inverse();
+  return difference.translation().norm() <= options.agreement_m &&
+         difference.rotation_angle_rad() * kDegPerRad <= options.agreement_deg;
+}
+
 std::optional<Revisit> LoopFinder::find(const Map& map, const PlaceIndex& places, KeyFrameId id) {
   std::optional<Revisit> found = candidate(map, places, id);
   const std::optional<SE3> before = std::exchange(last_correction_, std::nullopt);
   if (!found) return std::nullopt;
   const SE3& now = map.key_frame(id)->camera_from_world;
   const SE3 correction = found->camera_from_world.inverse() * now;
-  if (before) {
-    const SE3 difference = now * before->inverse() * correction * now.inverse();  // seen from the camera
-    if (difference.translation().norm() <= options_.agreement_m &&
-        difference.rotation_angle_rad() * kDegPerRad <= options_.agreement_deg)
-      return found;
-  }
+  if (before && agree(*before, correction, now, options_)) return found;
   last_correction_ = correction;
   return std::nullopt;
 }
 
 std::optional<Revisit> LoopFinder::candidate(const Map& map, const PlaceIndex& places, KeyFrameId id) const {
-  SearchScope scope{first_recent(map, id, options_.recent_key_frames)};
-  if (scope.before == map.key_frames().begin()->first) return std::nullopt;  // nothing is earlier
+  const KeyFrame& key_frame = *map.key_frame(id);
+  SearchScope scope{.before = first_recent(map, id, options_.recent_key_frames), .within = key_frame.sub_map};
+  if (scope.before == map.sub_maps().at(key_frame.sub_map)) return std::nullopt;  // nothing is earlier
   for (const Covisible& c : map.covisible(id, kConnected)) scope.apart_from.push_back(c.key_frame);
-  const std::optional<Relocalisation> place = relocalise(map, places, *map.key_frame(id)->features,
+  const std::optional<Relocalisation> place = relocalise(map, places, *key_frame.features,
                                                          {.candidates = options_.candidates,
                                                           .min_inliers = options_.min_inliers,
                                                           .min_seen_share = options_.min_seen_share},
                                                          scope);
   if (!place) return std::nullopt;
-  Revisit loop{place->key_frame, place->camera_from_world, {}, 0};
-  for (std::uint32_t f = 0; f < place->landmarks.size(); ++f)
-    if (place->landmarks[f].valid()) loop.matches.emplace_back(place->landmarks[f], f);
+  Revisit loop{place->key_frame, place->camera_from_world, place->matches(), 0};
   loop.shift_px = median_shift_px(map, id, loop);
   if (loop.shift_px < options_.least_shift_px || !is_plausible(map, id, loop)) return std::nullopt;
   return loop;
@@ -72,6 +72,7 @@ bool LoopFinder::is_plausible(const Map& map, KeyFrameId id, const Revisit& loop
   double way_m = 0, turned_rad = 0;
   const SE3* previous = nullptr;
   for (auto it = map.key_frames().find(loop.earlier); it != map.key_frames().end() && it->first <= id; ++it) {
+    if (it->second.sub_map != map.key_frame(id)->sub_map) continue;
     const SE3& pose = it->second.camera_from_world;
     if (previous != nullptr) {
       const SE3 step = pose * previous->inverse();

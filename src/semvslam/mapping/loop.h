@@ -24,8 +24,11 @@ struct LoopOptions {
   void add_to(ConfigSchema& schema);
 };
 
-/// Closes loops by appearance, however far the map has drifted: a key frame is looked for in the earlier part of the
-/// map as a lost frame is (relocalise()), and the next one must find the same. Close with close_revisit(). Of the
+/// Whether two motions of a world agree, as they are seen from the camera.
+bool agree(const SE3& a, const SE3& b, const SE3& camera_from_world, const LoopOptions& options);
+
+/// Closes loops by appearance, however far the map has drifted: a key frame is looked for in the earlier part of its
+/// sub-map as a lost frame is (relocalise()), and the next one must find the same. Close with close_revisit(). Of the
 /// checks two are for scenes where things are moved and look alike: of what the earlier key frame saw a share must be
 /// seen, for a moved poster brings none of its wall; and a correction must be small beside the way that it is to be the
 /// drift of.

@@ -22,7 +22,10 @@ double lap_ms(Clock::time_point& start) {
 }  // namespace
 
 Mapper::Mapper(const MappingOptions& options, Map map)
-    : options_(options), map_(std::move(map)), loop_finder_(options.loop) {
+    : options_(options),
+      map_(std::move(map)),
+      loop_finder_(options.loop),
+      join_finder_(options.sub_maps, options.relocalise, options.loop) {
   for (const auto& [id, key_frame] : map_.key_frames()) places_.add(id, landmark_descriptors(key_frame));
 }
 
@@ -35,23 +38,26 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
   create_landmarks(id);
   times_.create_ms = lap_ms(lap);
   places_.add(id, landmark_descriptors(*map_.key_frame(id)));
+  join(id);
+  times_.join_ms = lap_ms(lap);
   const int revisits = revisits_;
-  if (options_.revisit.enabled) {
+  if (options_.revisit.enabled && !joined_) {
     if (const std::optional<Revisit> revisit = find_revisit(map_, id, options_.revisit))
       revisits_ += close_revisit(map_, id, *revisit);
     times_.revisit_ms = lap_ms(lap);
   }
-  if (options_.loop.enabled && revisits_ == revisits) {
+  if (options_.loop.enabled && !joined_ && revisits_ == revisits) {
     if (const std::optional<Revisit> loop = loop_finder_.find(map_, places_, id))
       loops_ += close_revisit(map_, id, *loop);
     times_.loop_ms = lap_ms(lap);
   }
-  if (map_.key_frames().size() > 1) {
+  if (!is_first(id)) {
     fuse_with_neighbours(id);
+    if (joined_) fuse_around(id);
     times_.fuse_ms = lap_ms(lap);
     adjust_neighbourhood(id, stop);
     times_.bundle_ms = lap_ms(lap);
-    cull_key_frames(id);
+    if (!joined_) cull_key_frames(id);  // tracking finds its way into the other world by the key frames that it knows
     times_.cull_ms = lap_ms(lap);
   }
   std::shared_ptr<const LocalMap> local = make_local_map(map_, id, options_.local_map);
@@ -60,9 +66,21 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
   return local;
 }
 
+void Mapper::join(KeyFrameId id) {
+  joined_.reset();
+  const std::optional<Relocalisation> place = join_finder_.find(map_, places_, id);
+  if (!place) return;
+  joined_ = join_sub_maps(map_, id, *place);
+  ++joins_;
+  loop_finder_ = LoopFinder(options_.loop);  // what it found was in another world
+}
+
 KeyFrameId Mapper::insert(const NewKeyFrame& key_frame) {
-  const KeyFrameId id =
-      map_.add_key_frame(key_frame.frame, key_frame.stamp, key_frame.camera_from_world, key_frame.features);
+  // Whether the young landmarks of a place that was left for another world are found again nobody will see: they stay.
+  const auto& all = map_.key_frames();
+  if (!all.empty() && all.rbegin()->second.sub_map != key_frame.sub_map) young_.clear();
+  const KeyFrameId id = map_.add_key_frame(key_frame.frame, key_frame.stamp, key_frame.camera_from_world,
+                                           key_frame.features, key_frame.sub_map);
   for (std::size_t i = 0; i < key_frame.landmarks.size(); ++i) {
     const LandmarkId landmark = map_.resolve(key_frame.landmarks[i]);
     if (landmark.valid() && map_.add_observation(landmark, id, static_cast<std::uint32_t>(i)))
@@ -135,6 +153,13 @@ void Mapper::fuse_with_neighbours(KeyFrameId id) {
     if (landmark.valid()) map_.refresh_landmark(landmark);
 }
 
+void Mapper::fuse_around(KeyFrameId id) {
+  std::vector<Covisible> around = map_.covisible(id, options_.min_shared);
+  if (around.size() > static_cast<std::size_t>(options_.fuse_key_frames))
+    around.resize(static_cast<std::size_t>(options_.fuse_key_frames));
+  for (const Covisible& c : around) fuse_with_neighbours(c.key_frame);
+}
+
 void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target) {
   const KeyFrame& key_frame = *map_.key_frame(target);
   const FrameFeatures& features = *key_frame.features;
@@ -183,11 +208,13 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
 }
 
 void Mapper::adjust_all(std::stop_token stop) {
-  std::vector<KeyFrameId> window;
-  for (const auto& [id, key_frame] : map_.key_frames()) window.push_back(id);
-  // What bends a whole map (drift that a revisit has spread) gains little per step: five steps would leave most of it.
-  if (window.size() > 1)
+  for (const auto& [sub_map, first] : map_.sub_maps()) {
+    const std::vector<KeyFrameId> window = map_.key_frames_of(sub_map);
+    if (window.size() < 2 || window.back() < map_.first_of_session()) continue;
+    // What bends a whole map (drift that a revisit has spread) gains little per step: five steps would leave most of
+    // it.
     adjust(window, {.robust_iterations = 25, .final_iterations = 15, .relative_cost_tolerance = 1e-6}, stop);
+  }
 }
 
 void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {
@@ -217,14 +244,13 @@ void Mapper::adjust(const std::vector<KeyFrameId>& window, BaOptions options, st
   BaProblem problem;
   problem.camera = map_.model().intrinsics();
   std::map<KeyFrameId, std::uint32_t> index_of;
-  const KeyFrameId oldest = map_.key_frames().begin()->first;
   const auto add_pose = [&](KeyFrameId k, bool fixed) {
     index_of[k] = static_cast<std::uint32_t>(problem.poses.size());
     problem.poses.push_back(map_.key_frame(k)->camera_from_world);
     problem.pose_fixed.push_back(fixed ? 1 : 0);
   };
   for (const KeyFrameId k : window)
-    add_pose(k, k == oldest || (ranked.empty() && k == *std::min_element(window.begin(), window.end())));
+    add_pose(k, is_first(k) || (ranked.empty() && k == *std::min_element(window.begin(), window.end())));
   for (const auto& [count, k] : ranked) add_pose(k, true);
   std::vector<Observation> edge_source;
   std::vector<LandmarkId> edge_landmark;
@@ -275,9 +301,8 @@ bool Mapper::is_redundant(const KeyFrame& key_frame) const {
 }
 
 void Mapper::cull_key_frames(KeyFrameId newest) {
-  const KeyFrameId oldest = map_.key_frames().begin()->first;
   for (const Covisible& c : map_.covisible(newest, options_.min_shared)) {
-    if (c.key_frame == oldest || c.key_frame == newest) continue;
+    if (is_first(c.key_frame) || c.key_frame == newest) continue;
     if (!is_redundant(*map_.key_frame(c.key_frame))) continue;
     const std::vector<Covisible> neighbours = map_.covisible(c.key_frame, 1);
     places_.remove(c.key_frame);

@@ -11,6 +11,7 @@
 #include "semvslam/mapping/loop.h"
 #include "semvslam/mapping/relocalise.h"
 #include "semvslam/mapping/revisit.h"
+#include "semvslam/mapping/sub_maps.h"
 #include "semvslam/solve/bundle_adjustment.h"
 
 namespace semvslam {
@@ -32,6 +33,7 @@ struct MappingOptions {
   RevisitOptions revisit;
   LoopOptions loop;
   RelocaliseOptions relocalise;
+  SubMapOptions sub_maps;
 };
 
 /// A key frame as tracking saw it, ready to be put into the map.
@@ -41,16 +43,17 @@ struct NewKeyFrame {
   SE3 camera_from_world;
   std::shared_ptr<const FrameFeatures> features;
   std::vector<LandmarkId> landmarks;  // per feature; invalid = none; ids may be out of date
+  SubMapId sub_map{0};                // one that is not there begins with it
 };
 
 /// Milliseconds of one mapping step, by part.
 struct MappingTimes {
-  double create_ms = 0, revisit_ms = 0, loop_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
+  double create_ms = 0, join_ms = 0, revisit_ms = 0, loop_ms = 0, fuse_ms = 0, bundle_ms = 0, cull_ms = 0, total_ms = 0;
 };
 
 /// The one writer of the map: takes key frames in, makes, fuses, adjusts and culls. Every step works on a bounded
-/// neighbourhood of the new key frame; only when drift is removed every key frame moves. No threads inside; the same
-/// calls give the same map.
+/// neighbourhood of the new key frame; only when drift is removed, or a sub-map joined, all its key frames move. No
+/// threads inside; the same calls give the same map.
 class Mapper {
  public:
   Mapper(const MappingOptions& options, std::shared_ptr<const ObservationModel> model)
@@ -60,7 +63,7 @@ class Mapper {
 
   /// @return the snapshot that tracking goes on with.
   std::shared_ptr<const LocalMap> step(const NewKeyFrame& key_frame, std::stop_token stop = {});
-  /// Full bundle adjustment over every key frame and landmark.
+  /// Full bundle adjustment over every key frame and landmark of each sub-map that this session has added to.
   void adjust_all(std::stop_token stop = {});
   /// Looks for a lost frame in the whole map; nothing when it is nowhere, or not to be looked for.
   std::optional<Relocalisation> relocalise(const FrameFeatures& features) const {
@@ -80,13 +83,20 @@ class Mapper {
   /// How often drift since an earlier visit was removed: found where the camera should be, found by appearance.
   int revisits() const { return revisits_; }
   int loops() const { return loops_; }
+  /// How often two sub-maps were joined, and which ones by the last step.
+  int joins() const { return joins_; }
+  const std::optional<SubMapJoin>& joined() const { return joined_; }
 
  private:
   KeyFrameId insert(const NewKeyFrame& key_frame);
   void create_landmarks(KeyFrameId id);
+  /// Joins its sub-map with another that it is recognised in.
+  void join(KeyFrameId id);
   void cull_landmarks(KeyFrameId newest);
   std::vector<KeyFrameId> fusion_partners(KeyFrameId id) const;
   void fuse_with_neighbours(KeyFrameId id);
+  /// After a join: what its neighbours see in both parts, beside what it sees itself.
+  void fuse_around(KeyFrameId id);
   /// Searches landmarks in a key frame's image; adds observations and fuses duplicates.
   void fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target);
   void adjust_neighbourhood(KeyFrameId id, std::stop_token stop);
@@ -94,6 +104,8 @@ class Mapper {
   /// place.
   void adjust(const std::vector<KeyFrameId>& window, BaOptions options, std::stop_token stop);
   void cull_key_frames(KeyFrameId newest);
+  /// Holds its sub-map's world: is neither moved nor removed.
+  bool is_first(KeyFrameId id) const { return id == map_.sub_maps().at(map_.key_frame(id)->sub_map); }
   bool is_redundant(const KeyFrame& key_frame) const;
 
   MappingOptions options_;
@@ -101,7 +113,9 @@ class Mapper {
   MappingTimes times_;
   PlaceIndex places_;  // of every key frame
   LoopFinder loop_finder_;
-  int revisits_ = 0, loops_ = 0;
+  JoinFinder join_finder_;
+  std::optional<SubMapJoin> joined_;
+  int revisits_ = 0, loops_ = 0, joins_ = 0;
   std::vector<LandmarkId> young_;  // ascending
   std::vector<ProjectedQuery> queries_;
   std::vector<Match> matches_;

@@ -24,6 +24,11 @@ bool among(const std::vector<KeyFrameId>& key_frames, KeyFrameId id) {
   return std::ranges::find(key_frames, id) != key_frames.end();
 }
 
+bool holds(const SearchScope& scope, const KeyFrame& key_frame) {
+  return key_frame.id < scope.before && key_frame.sub_map != scope.without &&
+         (!scope.within.valid() || key_frame.sub_map == scope.within) && !among(scope.apart_from, key_frame.id);
+}
+
 /// Key frames by how many of the sample they hold, most first.
 std::vector<KeyFrameId> most_alike(const Map& map, const PlaceIndex& places, const FrameFeatures& features,
                                    const RelocaliseOptions& options, const SearchScope& scope) {
@@ -36,7 +41,7 @@ std::vector<KeyFrameId> most_alike(const Map& map, const PlaceIndex& places, con
   std::size_t compared = 0;
   for (const PlaceScore& place : places.query(features.orb.descriptors)) {
     if (compared == kFromIndex * candidates) break;
-    if (place.key_frame >= scope.before || among(scope.apart_from, place.key_frame)) continue;
+    if (!holds(scope, *map.key_frame(place.key_frame))) continue;
     ++compared;
     if (!scope.apart_from.empty() && std::ranges::any_of(map.covisible(place.key_frame, kLeastShared),
                                                          [&](auto& c) { return among(scope.apart_from, c.key_frame); }))
@@ -95,6 +100,13 @@ std::optional<Relocalisation> confirm(const Map& map, const FrameFeatures& featu
 }
 
 }  // namespace
+
+std::vector<std::pair<LandmarkId, std::uint32_t>> Relocalisation::matches() const {
+  std::vector<std::pair<LandmarkId, std::uint32_t>> out;
+  for (std::uint32_t f = 0; f < landmarks.size(); ++f)
+    if (landmarks[f].valid()) out.emplace_back(landmarks[f], f);
+  return out;
+}
 
 void RelocaliseOptions::add_to(ConfigSchema& s) {
   s.add("mapping.relocalise.enabled", &enabled, "a frame that got lost is looked for in the whole map");

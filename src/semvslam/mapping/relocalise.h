@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "semvslam/base/config_schema.h"
@@ -28,6 +30,9 @@ struct Relocalisation {
   SE3 camera_from_world;
   std::vector<LandmarkId> landmarks;  // per feature; invalid = none
   int inliers = 0;
+
+  /// Landmarks and the features they are.
+  std::vector<std::pair<LandmarkId, std::uint32_t>> matches() const;
 };
 
 /// The part of the map that is searched.
@@ -36,6 +41,8 @@ struct SearchScope {
   KeyFrameId before{KeyFrameId::kNone};
   /// So are these key frames, and those that share landmarks with them.
   std::vector<KeyFrameId> apart_from = {};
+  /// The one sub-map that is searched, and the one that is not; invalid = all, none.
+  SubMapId within = {}, without = {};
 };
 
 /// Looks for a frame in the map by what it looks like, without any idea where the camera is. The index names key

@@ -103,6 +103,14 @@ TEST_F(RelocaliseTest, TheScopeLeavesOutKeyFramesAndWhatTheySee) {
     EXPECT_TRUE(!l.valid() || map.landmark(l)->observations.back().key_frame < KeyFrameId(5));
 }
 
+TEST_F(RelocaliseTest, TheScopeMayBeOneSubMapOrLeaveOneOut) {
+  const auto f = look(pose(7), 5);
+  EXPECT_TRUE(find(*f, {.within = SubMapId(0)}));
+  EXPECT_FALSE(find(*f, {.within = SubMapId(1)}));
+  EXPECT_TRUE(find(*f, {.without = SubMapId(1)}));
+  EXPECT_FALSE(find(*f, {.without = SubMapId(0)}));
+}
+
 TEST_F(RelocaliseTest, AFewFeaturesAreNotEnough) {
   const auto f = look(pose(2.2), 0);
   std::vector<std::uint8_t> keep(f->size(), 0);

@@ -36,12 +36,13 @@ PoseGraphProblem::Edge edge(std::uint32_t a, std::uint32_t b, const SE3& a_from_
   return e;
 }
 
-/// Poses of all key frames (world_from_camera) with the links that hold them; index by key frame.
-PoseGraphProblem essential_graph(const Map& map, std::map<KeyFrameId, std::uint32_t>& index_of) {
+/// Poses of all key frames of a sub-map (world_from_camera) with the links that hold them; index by key frame.
+PoseGraphProblem essential_graph(const Map& map, SubMapId sub_map, std::map<KeyFrameId, std::uint32_t>& index_of) {
   PoseGraphProblem graph;
-  for (const auto& [id, key_frame] : map.key_frames()) {
+  const std::vector<KeyFrameId> key_frames = map.key_frames_of(sub_map);
+  for (const KeyFrameId id : key_frames) {
     index_of[id] = static_cast<std::uint32_t>(graph.world_from_pose.size());
-    graph.world_from_pose.push_back(key_frame.camera_from_world.inverse());
+    graph.world_from_pose.push_back(map.key_frame(id)->camera_from_world.inverse());
     graph.fixed.push_back(graph.fixed.empty() ? 1 : 0);
   }
   const auto link = [&](KeyFrameId a, KeyFrameId b, int shared) {
@@ -50,7 +51,7 @@ PoseGraphProblem essential_graph(const Map& map, std::map<KeyFrameId, std::uint3
                                std::max(shared, 1)));
   };
   KeyFrameId previous;
-  for (const auto& [id, key_frame] : map.key_frames()) {
+  for (const KeyFrameId id : key_frames) {
     int with_previous = 0;
     for (const Covisible& c : map.covisible(id, 1)) {
       if (c.key_frame == previous) with_previous = c.shared;
@@ -117,25 +118,8 @@ std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const Revisit
   return revisit;
 }
 
-bool close_revisit(Map& map, KeyFrameId id, const Revisit& revisit) {
-  std::map<KeyFrameId, std::uint32_t> index_of;
-  PoseGraphProblem graph = essential_graph(map, index_of);
-  const std::vector<SE3> before = graph.world_from_pose;
-  const SE3& earlier_from_world = map.key_frame(revisit.earlier)->camera_from_world;
-  graph.edges.push_back(edge(index_of.at(revisit.earlier), index_of.at(id),
-                             earlier_from_world * revisit.camera_from_world.inverse(),
-                             kRevisitWeight * static_cast<double>(revisit.matches.size())));
-  if (!optimize_pose_graph(graph).usable) return false;
-
-  for (const LandmarkId l : map.landmark_ids()) {
-    const Landmark& landmark = *map.landmark(l);
-    // Those of the earlier visit stay with it, whoever saw them since.
-    const std::uint32_t k = index_of.at(landmark.observations.front().key_frame);
-    map.set_position(l, graph.world_from_pose[k] * (before[k].inverse() * landmark.position));
-  }
-  for (const auto& [key_frame, k] : index_of) map.set_pose(key_frame, graph.world_from_pose[k].inverse());
-  for (const LandmarkId l : map.landmark_ids()) map.refresh_geometry(l);
-  for (const auto& [landmark, feature] : revisit.matches) {
+void fuse_matches(Map& map, KeyFrameId id, const std::vector<std::pair<LandmarkId, std::uint32_t>>& matches) {
+  for (const auto& [landmark, feature] : matches) {
     if (map.landmark(landmark) == nullptr) continue;  // fused into another just now
     const LandmarkId existing = map.key_frame(id)->landmarks[feature];
     if (existing.valid())
@@ -143,6 +127,29 @@ bool close_revisit(Map& map, KeyFrameId id, const Revisit& revisit) {
     else
       map.add_observation(landmark, id, feature);
   }
+}
+
+bool close_revisit(Map& map, KeyFrameId id, const Revisit& revisit) {
+  const SubMapId sub_map = map.key_frame(id)->sub_map;
+  std::map<KeyFrameId, std::uint32_t> index_of;
+  PoseGraphProblem graph = essential_graph(map, sub_map, index_of);
+  const std::vector<SE3> before = graph.world_from_pose;
+  const SE3& earlier_from_world = map.key_frame(revisit.earlier)->camera_from_world;
+  graph.edges.push_back(edge(index_of.at(revisit.earlier), index_of.at(id),
+                             earlier_from_world * revisit.camera_from_world.inverse(),
+                             kRevisitWeight * static_cast<double>(revisit.matches.size())));
+  if (!optimize_pose_graph(graph).usable) return false;
+
+  const std::vector<LandmarkId> landmarks = map.landmark_ids(sub_map);
+  for (const LandmarkId l : landmarks) {
+    const Landmark& landmark = *map.landmark(l);
+    // Those of the earlier visit stay with it, whoever saw them since.
+    const std::uint32_t k = index_of.at(landmark.observations.front().key_frame);
+    map.set_position(l, graph.world_from_pose[k] * (before[k].inverse() * landmark.position));
+  }
+  for (const auto& [key_frame, k] : index_of) map.set_pose(key_frame, graph.world_from_pose[k].inverse());
+  for (const LandmarkId l : landmarks) map.refresh_geometry(l);
+  fuse_matches(map, id, revisit.matches);
   return true;
 }
 

@@ -42,6 +42,9 @@ double median_shift_px(const Map& map, KeyFrameId id, const Revisit& revisit);
 /// Finds places whose drift is still small, at any speed; for the others see loop.h.
 std::optional<Revisit> find_revisit(const Map& map, KeyFrameId id, const RevisitOptions& options);
 
+/// Fuses the landmarks of a key frame's features with those that they were found to be.
+void fuse_matches(Map& map, KeyFrameId id, const std::vector<std::pair<LandmarkId, std::uint32_t>>& matches);
+
 /// Spreads the correction over the key frames since then and moves their landmarks along (essential graph: Strasdat et
 /// al., Double window optimisation for constant time visual SLAM, ICCV 2011; ORB-SLAM, section VII-C), then fuses the
 /// matches. Links between key frames weigh by the landmarks they share, so that weak ones, as in blurred images, give
