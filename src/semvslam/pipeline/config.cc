@@ -75,6 +75,7 @@ void describe(ConfigSchema& s, MappingOptions& m) {
   m.revisit.add_to(s);
   m.loop.add_to(s);
   m.relocalise.add_to(s);
+  m.sub_maps.add_to(s);
   LocalMapOptions& l = m.local_map;
   s.add("mapping.local_map.covisible_key_frames", &l.covisible_key_frames, {1, 1000},
         "covisible key frames that tracking searches");

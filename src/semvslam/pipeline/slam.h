@@ -30,8 +30,10 @@ struct TrackResult {
   FrameId frame;
   TimeStamp stamp;
   TrackingState state = TrackingState::kInitializing;
-  /// Metres; world = camera of the first key frame, or the world of the saved map. While lost: the last known pose.
+  /// Metres; world = camera of the sub-map's first key frame, or the world of the saved map. While lost: the last known
+  /// pose.
   SE3 world_from_camera;
+  SubMapId sub_map{0};
   int inliers = 0;  // landmarks that agree with the pose
   bool is_key_frame = false;
   MaskSource mask_source = MaskSource::kNone;
@@ -54,9 +56,19 @@ struct DynamicTotals {
   void add(const DynamicRecord& record);
 };
 
-struct SlamStatistics {
-  std::uint64_t frames = 0, tracked = 0, lost = 0;
-  std::uint64_t key_frames = 0, landmarks = 0;                // of the whole map
+/// A part of the map with a world of its own.
+struct SubMapStatistics {
+  SubMapId sub_map{0};
+  std::uint64_t tracked = 0;  // frames
+  std::uint64_t key_frames = 0, landmarks = 0;
+};
+
+/// Its own SubMapStatistics are those of the main sub-map, which results are of: the saved map's, or without one that
+/// with the most tracked frames (of equal ones the older).
+struct SlamStatistics : SubMapStatistics {
+  std::uint64_t frames = 0, lost = 0;
+  std::vector<SubMapStatistics> apart;                        // the sub-maps that were not joined with it, by id
+  std::uint64_t sub_maps_begun = 0, sub_maps_joined = 0;      // beside the one that the run began with
   std::uint64_t loaded_key_frames = 0, loaded_landmarks = 0;  // of the saved map that it began with, at the beginning
   std::uint64_t relocalised = 0;                              // times that a lost camera was found in the map
   std::uint64_t revisits = 0;  // times that drift since an earlier visit of a place was removed
@@ -82,6 +94,8 @@ class Sink {
   virtual void on_frame(const RgbdFrame& frame, const TrackResult& result) = 0;
   /// Something went wrong that the run survives: one line.
   virtual void on_notice(const std::string&) {}
+  /// Something is worth telling: one line.
+  virtual void on_event(const std::string&) {}
 };
 
 /// The whole system. Feed frames in the order of their stamps; ask for the trajectory at any time; finish() at the end.
@@ -111,18 +125,22 @@ class Slam {
   /// (mapping.final_bundles); further calls do nothing. @return what went wrong in any stage.
   Status finish();
 
+  // A camera that is lost and nowhere in the map goes on in a sub-map, in a world of its own; when its place is
+  // recognised, that becomes a part of the older one. Where a sub-map may be named, none means the main one (see
+  // SlamStatistics), and one that is not there (any more) is empty.
+
   /// Writes the map to a file, for another session to begin in; after finish() with everything that was learnt. Errors:
   /// an empty map; mapping that failed; as write_map().
-  Status save_map(const std::filesystem::path& path) const;
+  Status save_map(const std::filesystem::path& path, std::optional<SubMapId> sub_map = {}) const;
 
-  /// Poses (world_from_camera) of all tracked frames with everything that mapping has learnt since, by time.
-  Trajectory trajectory() const;
+  /// Poses (world_from_camera) of all frames tracked with everything that mapping has learnt since, by time.
+  Trajectory trajectory(std::optional<SubMapId> sub_map = {}) const;
   /// Of the key frames of this session.
-  Trajectory key_frame_trajectory() const;
+  Trajectory key_frame_trajectory(std::optional<SubMapId> sub_map = {}) const;
   /// What moved in each key frame, in the order of key_frame_trajectory(): its other pixels are the static scene's.
-  std::vector<KeyFrameMask> key_frame_masks() const;
-  /// Positions of all landmarks, world frame, metres.
-  std::vector<Eigen::Vector3d> landmark_positions() const;
+  std::vector<KeyFrameMask> key_frame_masks(std::optional<SubMapId> sub_map = {}) const;
+  /// Positions of all landmarks, in the sub-map's world, metres.
+  std::vector<Eigen::Vector3d> landmark_positions(std::optional<SubMapId> sub_map = {}) const;
   SlamStatistics statistics() const;
   const Config& effective_config() const;
   /// See Map::check_invariants().

@@ -33,7 +33,7 @@ struct KeyFrameRequest {
   TimeStamp stamp;
   std::shared_ptr<const FrameFeatures> features;
   std::vector<LandmarkId> landmarks;  // per feature; invalid = none
-  KeyFrameId reference;               // invalid for the first key frame of a map
+  KeyFrameId reference;               // invalid for the first key frame of a map or of a sub-map
   SE3 camera_from_reference;          // stays true when mapping moves the reference meanwhile
   std::vector<LandmarkUse> uses;      // since the previous request
 };

@@ -45,7 +45,7 @@ Tracker::Tracker(const TrackingOptions& options, const OrbOptions& orb, const Dy
       filter_(model_->camera(), dynamic) {}
 
 Tracker::Output Tracker::step(const RgbdFrame& frame, const Segmentation* segmentation,
-                              std::shared_ptr<const LocalMap> local, bool may_request) {
+                              std::shared_ptr<const LocalMap> local, bool may_request, bool may_begin) {
   const Clock::time_point start = Clock::now();
   Output output;
   observe(frame, segmentation, output.times);
@@ -57,6 +57,7 @@ Tracker::Output Tracker::step(const RgbdFrame& frame, const Segmentation* segmen
   } else if (!waiting_for_map_) {
     initialise(frame, output);
   }
+  if (output.state == TrackingState::kLost && may_begin && use_ != MapUse::kFollow) begin_anew(frame, output);
   const bool tracked = output.state == TrackingState::kTracking;
   filter_.end(tracked ? std::optional<SE3>(output.camera_from_world) : std::nullopt, is_tracked_);
   output.dynamic = filter_.record();
@@ -170,10 +171,23 @@ void Tracker::initialise(const RgbdFrame& frame, Output& output) {
   if (with_depth < options_.min_initial_points) return;
   output.state = TrackingState::kTracking;
   output.inliers = with_depth;
+  last_relative_.reset();
   output.key_frame = make_request(frame);
   waiting_for_map_ = true;
   last_ = std::move(current_);
-  last_relative_.reset();
+}
+
+void Tracker::begin_anew(const RgbdFrame& frame, Output& output) {
+  // What it was taken for before it counted as lost is void.
+  current_.camera_from_world = SE3();
+  current_.landmarks.assign(current_.features->size(), LandmarkId());
+  is_tracked_.assign(current_.features->size(), 0);
+  initialise(frame, output);
+  if (output.state == TrackingState::kLost) return;
+  output.camera_from_world = last_.camera_from_world;
+  output.search.reset();
+  lost_frames_ = frames_off_map_ = 0;
+  filter_.forget_poses();
 }
 
 void Tracker::adopt(std::shared_ptr<const LocalMap> local) {

@@ -50,7 +50,7 @@ class Tracker {
   struct Output {
     TrackingState state = TrackingState::kInitializing;
     SE3 camera_from_world;
-    std::optional<RelativePose> relative;      // absent until the first key frame is in the map, and while lost
+    std::optional<RelativePose> relative;      // absent for a world's first key frame, and while lost
     int inliers = 0;                           // landmarks that agree with the pose
     std::optional<KeyFrameRequest> key_frame;  // present when this frame should be kept
     std::optional<LocalMapRequest> local_map;  // MapUse::kFollow: present when the camera has gone on
@@ -66,8 +66,10 @@ class Tracker {
   /// @param local the newest snapshot of the map; null before the first key frame has been mapped, or the first frame
   /// has been found in a map that was there before.
   /// @param may_request whether mapping would take a request now.
+  /// @param may_begin whether a frame that is lost may begin a map anew, in a world of its own: then the next step()
+  /// must get that one's snapshot.
   Output step(const RgbdFrame& frame, const Segmentation* segmentation, std::shared_ptr<const LocalMap> local,
-              bool may_request);
+              bool may_request, bool may_begin = false);
 
   /// Goes on from where a lost frame was found; the next step() must get found.local, or a newer one. @return false
   /// when tracking has found back by itself meanwhile: then nothing changes.
@@ -94,7 +96,10 @@ class Tracker {
   void observe(const RgbdFrame& frame, const Segmentation* segmentation, TrackingTimes& times);
   /// Sets how many features the next image should give, from how many of this one's may be used.
   void share_features(std::size_t used, std::size_t extracted);
+  /// Begins a world with this frame, if enough is seen in it.
   void initialise(const RgbdFrame& frame, Output& output);
+  /// The same for a frame that is lost.
+  void begin_anew(const RgbdFrame& frame, Output& output);
   void estimate(const RgbdFrame& frame, bool may_request, Output& output);
   void lose(FrameId frame, Output& output);
   /// Moves the previous frame with its reference key frame when mapping has adjusted that, and follows fused landmarks.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "semvslam/tracking/plane_world_testing.h"
 
 namespace semvslam {
@@ -18,9 +20,11 @@ class TrackerTest : public ::testing::Test {
 
   /// Maps the first frame the way mapping does: every feature with depth becomes a landmark.
   std::shared_ptr<const LocalMap> start() {
-    const Tracker::Output first = tracker.step(world.render(0), nullptr, nullptr, true);
+    return begin_map(tracker.step(world.render(0), nullptr, nullptr, true), SubMapId(0));
+  }
+  std::shared_ptr<const LocalMap> begin_map(const Tracker::Output& first, SubMapId sub_map) {
     EXPECT_TRUE(first.key_frame.has_value());
-    const KeyFrameId id = map.add_key_frame(first.key_frame->frame, {}, SE3(), first.key_frame->features);
+    const KeyFrameId id = map.add_key_frame(first.key_frame->frame, {}, SE3(), first.key_frame->features, sub_map);
     for (std::uint32_t i = 0; i < first.key_frame->features->size(); ++i)
       if (first.key_frame->features->has_depth(i))
         map.add_landmark(model->back_project(*first.key_frame->features, i), id, i);
@@ -146,6 +150,40 @@ TEST_F(TrackerTest, InAMapThatIsThereTheFirstFramesAreLostAndLookedFor) {
   const Tracker::Output found = later.step(world.render(2), nullptr, local, true);
   ASSERT_EQ(found.state, TrackingState::kTracking);
   EXPECT_LT((found.camera_from_world * PlaneWorld::world_from_camera(2)).translation().norm(), 0.002);
+}
+
+TEST_F(TrackerTest, ALostFrameBeginsAWorldOfItsOwnOnlyWhenItMay) {
+  const auto local = start();
+  ASSERT_EQ(tracker.step(world.render(1), nullptr, local, true).state, TrackingState::kTracking);
+  const PlaneWorld elsewhere(8);
+  EXPECT_EQ(tracker.step(elsewhere.render(2), nullptr, local, true).state, TrackingState::kLost);
+  RgbdFrame blind = elsewhere.render(3);
+  blind.depth.setTo(0);
+  const Tracker::Output lost = tracker.step(blind, nullptr, local, true, true);
+  EXPECT_EQ(lost.state, TrackingState::kLost) << "too little for a map";
+  EXPECT_TRUE(lost.search.has_value());
+  const Tracker::Output begun = tracker.step(elsewhere.render(4), nullptr, local, true, true);
+  ASSERT_EQ(begun.state, TrackingState::kTracking);
+  EXPECT_EQ(begun.camera_from_world.log().norm(), 0) << "the world is its camera";
+  EXPECT_FALSE(begun.search.has_value()) << "it is not lost any more";
+  EXPECT_FALSE(begun.relative.has_value());
+  ASSERT_TRUE(begun.key_frame.has_value());
+  EXPECT_FALSE(begun.key_frame->reference.valid());
+  const std::vector<LandmarkId>& known = begun.key_frame->landmarks;
+  EXPECT_TRUE(std::ranges::none_of(known, [](LandmarkId id) { return id.valid(); }));
+  const auto other = begin_map(begun, SubMapId(1));
+  EXPECT_EQ(other->sub_map, SubMapId(1));
+  for (int i = 5; i <= 8; ++i) {
+    const Tracker::Output out = tracker.step(elsewhere.render(i), nullptr, other, true);
+    ASSERT_EQ(out.state, TrackingState::kTracking) << "frame " << i;
+    const SE3 truth = PlaneWorld::world_from_camera(i).inverse() * PlaneWorld::world_from_camera(4);
+    EXPECT_LT((out.camera_from_world * truth.inverse()).translation().norm(), 0.002) << "frame " << i;
+  }
+}
+
+TEST_F(TrackerTest, ACameraThatIsOnlyLocalisedBeginsNothing) {
+  Tracker follower(TrackingOptions{}, OrbOptions{}, DynamicOptions{}, model, MapUse::kFollow);
+  EXPECT_EQ(follower.step(world.render(0), nullptr, nullptr, true, true).state, TrackingState::kLost);
 }
 
 TEST_F(TrackerTest, WhereOnlyTheCameraIsOfInterestTheSnapshotIsAskedForThatIsNearest) {
