@@ -7,19 +7,9 @@ import struct
 import unittest
 import zlib
 
-from program_testing import HEIGHT, WIDTH, ProgramCase, call
+from program_testing import HEIGHT, WIDTH, ProgramCase, call, png
 
 FRAMES = ProgramCase.FRAMES
-
-
-def png(width, height, bits=8):
-    """A black PNG with one channel."""
-    def chunk(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    rows = (b"\0" + bytes(width * bits // 8)) * height
-    header = struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
 
 
 def float_tiff(width, height, values):

@@ -4,10 +4,12 @@ sanitizer."""
 import os
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
 WIDTH, HEIGHT = 320, 240
@@ -16,6 +18,22 @@ WIDTH, HEIGHT = 320, 240
 def call(*arguments, **options):
     return subprocess.run([PROGRAM, *map(str, arguments)], stdout=options.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE,
                           text=True, timeout=240, check=False, **options)
+
+
+def png(width, height, bits=8):
+    """A black PNG with one channel."""
+    def chunk(name, data):
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    rows = (b"\0" + bytes(width * bits // 8)) * height
+    header = struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
+
+
+def poses(file):
+    """Stamp -> the seven numbers of the pose."""
+    lines = [line.split() for line in file.read_text().splitlines() if not line.startswith("#")]
+    return {line[0]: [float(word) for word in line[1:]] for line in lines}
 
 
 class ErrorLineCase(unittest.TestCase):
@@ -31,6 +49,7 @@ class ErrorLineCase(unittest.TestCase):
 class ProgramCase(ErrorLineCase):
     """A folder for everything, with a rendered recording `whole` of FRAMES frames in it; `out` is for a test's results."""
     FRAMES = 30
+    RENDER = ()  # further options
 
     @classmethod
     def setUpClass(cls):
@@ -38,7 +57,7 @@ class ProgramCase(ErrorLineCase):
         cls.whole = cls.folder / "whole"
         renderer = os.environ.get("SEMVSLAM_RENDERER", PROGRAM)
         subprocess.run([renderer, "render", "--out", cls.whole, "--people", "none", "--size", f"{WIDTH}x{HEIGHT}",
-                        "--frames", str(cls.FRAMES), "--quiet"], check=True)
+                        "--frames", str(cls.FRAMES), "--quiet", *cls.RENDER], check=True)
 
     @classmethod
     def tearDownClass(cls):

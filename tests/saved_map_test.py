@@ -8,15 +8,9 @@ import struct
 import subprocess
 import unittest
 
-from program_testing import HEIGHT, PROGRAM, WIDTH, ProgramCase, call
+from program_testing import HEIGHT, PROGRAM, WIDTH, ProgramCase, call, poses
 
 HEADER = 24  # bytes of a map file: mark, version, checksum, length
-
-
-def poses(file):
-    """Stamp -> the seven numbers of the pose."""
-    lines = [line.split() for line in file.read_text().splitlines() if not line.startswith("#")]
-    return {line[0]: [float(word) for word in line[1:]] for line in lines}
 
 
 class SavedMapTest(ProgramCase):

@@ -40,19 +40,48 @@ TEST_F(RunOutputTest, ResultsReplaceThePosesAsTracked) {
   ASSERT_TRUE(output);
   ASSERT_TRUE(output->add_pose(pose(1, 2)));
   const std::vector<Eigen::Vector3d> points = {{1, 2, 3}, {4, 5, 6}};
-  ASSERT_TRUE(output->write_results({pose(1, 9)}, {pose(1, 9)}, points));
+  ASSERT_TRUE(output->write_results({{pose(1, 9)}, {pose(1, 9)}, {}, points}, {}));
   EXPECT_THAT(content("trajectory.txt"), ::testing::HasSubstr("1.000000000 9.000000000"));
   EXPECT_THAT(content("trajectory.txt"), ::testing::Not(::testing::HasSubstr(" 2.000000000")));
   EXPECT_EQ(content("map.ply"), format_ply(points));
 }
 
+TEST_F(RunOutputTest, NoFileHoldsPosesOfTwoWorlds) {
+  auto output = RunOutput::create(out_);
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->add_pose(pose(1, 2)));
+  for (const std::uint32_t sub_map : {1, 2}) ASSERT_TRUE(output->add_pose(pose(1 + sub_map, 3), SubMapId(sub_map)));
+  EXPECT_THAT(content("trajectory.txt"), ::testing::Not(::testing::HasSubstr("2.000000000 3.0")));
+  EXPECT_THAT(content("trajectory.2.txt"), ::testing::HasSubstr("2.000000000 3.000000000"));
+  EXPECT_THAT(content("trajectory.3.txt"), ::testing::HasSubstr("3.000000000 3.000000000"));
+  // The third is the main one, of which the second has become a part; the first is apart.
+  const std::vector<Eigen::Vector3d> points = {{1, 2, 3}};
+  ASSERT_TRUE(output->write_results({{pose(2, 7), pose(3, 8)}, {}, {}, {}},
+                                    {{SubMapId(0), {{pose(1, 2)}, {pose(1, 2)}, {}, points}}}));
+  EXPECT_THAT(content("trajectory.txt"), ::testing::HasSubstr("3.000000000 8.000000000"));
+  EXPECT_THAT(content("trajectory.1.txt"), ::testing::HasSubstr("1.000000000 2.000000000"));
+  EXPECT_EQ(content("map.1.ply"), format_ply(points));
+  EXPECT_TRUE(fs::exists(out_ / "keyframes.1.txt"));
+  EXPECT_FALSE(fs::exists(out_ / "trajectory.2.txt"));
+  EXPECT_FALSE(fs::exists(out_ / "trajectory.3.txt"));
+}
+
+TEST(Numbered, TheNumberStandsBeforeTheExtension) {
+  EXPECT_EQ(numbered("a/room.map", SubMapId(1)), "a/room.2.map");
+  EXPECT_EQ(numbered("room", SubMapId(9)), "room.10");
+}
+
 TEST_F(RunOutputTest, EarlierResultsAreRemoved) {
   fs::create_directories(out_);
   std::ofstream(out_ / "stats.json") << "old";
-  std::ofstream(out_ / "mine.txt") << "kept";
+  for (const char* name : {"trajectory.2.txt", "map.12.ply"}) std::ofstream(out_ / name) << "old";
+  for (const char* name : {"mine.txt", "mine.2.txt", "trajectory.old.txt", "map.2.txt"})
+    std::ofstream(out_ / name) << "kept";
   ASSERT_TRUE(RunOutput::create(out_));
-  EXPECT_FALSE(fs::exists(out_ / "stats.json"));
-  EXPECT_TRUE(fs::exists(out_ / "mine.txt"));
+  for (const char* name : {"stats.json", "trajectory.2.txt", "map.12.ply"})
+    EXPECT_FALSE(fs::exists(out_ / name)) << name;
+  for (const char* name : {"mine.txt", "mine.2.txt", "trajectory.old.txt", "map.2.txt"})
+    EXPECT_TRUE(fs::exists(out_ / name)) << name;
 }
 
 TEST_F(RunOutputTest, AFileInPlaceOfTheFolderIsAnError) {

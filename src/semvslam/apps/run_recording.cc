@@ -52,12 +52,21 @@ Result<int> run_recording(const std::filesystem::path& sequence, SequenceOptions
   Result<RunOutcome> outcome = run_session(std::move(*source), config, options);
   if (!outcome) return outcome.error();
   fmt::print("{}", format_summary(outcome->record, outcome->statistics));
-  if (!options.dense_maps.empty() && !outcome->key_frames.empty()) {
+  if (!options.dense_maps.empty()) {
     sequence_options.on_warning = nullptr;  // said before
-    const Result<DenseMapSummary> dense = make_dense_map(sequence, sequence_options, outcome->key_frames,
-                                                         outcome->key_frame_masks, config.dense, options.dense_maps);
-    if (dense) fmt::print("{}", format_summary(*dense));
-    if (!dense && outcome->status) outcome->status = dense.error();
+    const auto make = [&](const SubMapResults& results, const std::vector<std::filesystem::path>& files) {
+      if (results.key_frames.empty()) return;
+      const Result<DenseMapSummary> dense =
+          make_dense_map(sequence, sequence_options, results.key_frames, results.key_frame_masks, config.dense, files);
+      if (dense) fmt::print("{}", format_summary(*dense));
+      if (!dense && outcome->status) outcome->status = dense.error();
+    };
+    make(*outcome, options.dense_maps);
+    for (const auto& [sub_map, results] : outcome->apart) {
+      std::vector<std::filesystem::path> files;
+      for (const std::filesystem::path& file : options.dense_maps) files.push_back(numbered(file, sub_map));
+      make(results, files);
+    }
   }
   return conclude(*outcome, sequence, options.out);
 }

@@ -104,6 +104,7 @@ class NoticeSink final : public Sink {
     output_.log("warning", line);
     fmt::print(stderr, "semvslam: warning: {}\n", line);
   }
+  void on_event(const std::string& line) override { output_.log("info", line); }
 
  private:
   RunOutput& output_;
@@ -211,7 +212,7 @@ Status Session::use(SegmentedFrame next) {
   }
   note_state(*result);
   if (result->state != TrackingState::kTracking) return Status::success();
-  const Status written = output_.add_pose({result->stamp, result->world_from_camera});
+  const Status written = output_.add_pose({result->stamp, result->world_from_camera}, result->sub_map);
   if (!written && !disk_trouble_) progress_.message("semvslam: warning: " + written.error().message + "; trying on");
   disk_trouble_ = !written;
   return Status::success();
@@ -271,16 +272,30 @@ Result<std::unique_ptr<Slam>> make_slam(const Config& config, const Camera& came
   return Slam::create(config, camera, std::move(*map));
 }
 
-Error nothing_tracked(std::uint64_t frames, const RunOptions& options) {
+Error nothing_tracked(const RunOutcome& outcome, const RunOptions& options) {
+  const std::uint64_t frames = outcome.record.read;
   const std::string log = (options.out / "run.log").string();
   if (options.map.empty())
     return {ErrorCode::kInvalidInput, fmt::format("none of the {} frames could be tracked (see {})", frames, log)};
-  return {ErrorCode::kInvalidInput,
-          fmt::format("{}: none of the {} frames was found in this map (see {})", options.map.string(), frames, log)};
+  std::string what =
+      fmt::format("{}: none of the {} frames was found in this map (see {})", options.map.string(), frames, log);
+  if (!outcome.apart.empty())
+    what += fmt::format("; what was tracked all the same begins in {}",
+                        numbered(options.out / "trajectory.txt", outcome.apart.begin()->first).string());
+  return {ErrorCode::kInvalidInput, what};
 }
 
 void keep_first(Status& first, Status status) {
   if (first && !status) first = std::move(status);
+}
+
+/// A map that a run could begin in stays what it is where nothing was found in it.
+Status save_maps(const Slam& slam, const RunOutcome& outcome, const std::filesystem::path& file) {
+  Status first;
+  if (outcome.statistics.tracked > 0) keep_first(first, slam.save_map(file));
+  for (const auto& [sub_map, results] : outcome.apart)
+    keep_first(first, slam.save_map(numbered(file, sub_map), sub_map));
+  return first;
 }
 
 }  // namespace
@@ -333,18 +348,20 @@ Result<RunOutcome> run_session(std::unique_ptr<FrameSource> source, Config& conf
     if (truth) outcome.record.truth = truth->counts();
   }
   outcome.statistics = (*slam)->statistics();
-  outcome.trajectory = (*slam)->trajectory();
-  outcome.key_frames = (*slam)->key_frame_trajectory();
-  outcome.key_frame_masks = (*slam)->key_frame_masks();
-  keep_first(outcome.status,
-             output->write_results(outcome.trajectory, outcome.key_frames, (*slam)->landmark_positions()));
-  if (!options.save_map.empty() && outcome.statistics.tracked > 0)
-    keep_first(outcome.status, (*slam)->save_map(options.save_map));
-  if (!options.key_frame_masks.empty())
+  static_cast<SubMapResults&>(outcome) = SubMapResults::of(**slam, outcome.statistics.sub_map);
+  for (const SubMapStatistics& s : outcome.statistics.apart)
+    outcome.apart.emplace(s.sub_map, SubMapResults::of(**slam, s.sub_map));
+  keep_first(outcome.status, output->write_results(outcome, outcome.apart));
+  if (!options.save_map.empty()) keep_first(outcome.status, save_maps(**slam, outcome, options.save_map));
+  if (!options.key_frame_masks.empty()) {
     keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, outcome.key_frame_masks));
+    for (const auto& [sub_map, results] : outcome.apart)
+      keep_first(outcome.status, write_key_frame_masks(options.key_frame_masks, results.key_frame_masks));
+  }
   keep_first(outcome.status, output->write("stats.json", format_statistics(outcome.record, outcome.statistics)));
   if (outcome.status && outcome.signal == 0 && outcome.statistics.tracked == 0)
-    outcome.status = nothing_tracked(outcome.record.read, options);
+    outcome.status = nothing_tracked(outcome, options);
+  for (const std::string& line : format_apart(outcome.statistics)) output->log("warning", line);
   output->log("info", outcome.record.end);
   return outcome;
 }

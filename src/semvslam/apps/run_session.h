@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "semvslam/apps/run_output.h"
 #include "semvslam/apps/run_statistics.h"
 #include "semvslam/base/process_stats.h"
 #include "semvslam/base/result.h"
@@ -35,15 +37,13 @@ struct RunOptions {
   ProcessTime before;  // spent on something else, as the demo on rendering: not counted to the run
 };
 
-/// How a run ended; everything computed is in the output folder.
-struct RunOutcome {
+/// How a run ended, and the results of the main sub-map; everything computed is in the output folder.
+struct RunOutcome : SubMapResults {
   RunRecord record;
   SlamStatistics statistics;
-  Trajectory trajectory;  // as in trajectory.txt
-  Trajectory key_frames;  // as in keyframes.txt
-  std::vector<KeyFrameMask> key_frame_masks;
-  int signal = 0;  // that ended it early; 0 = none
-  Status status;   // why it is not a success although results were written
+  std::map<SubMapId, SubMapResults> apart;  // of the other sub-maps
+  int signal = 0;                           // that ended it early; 0 = none
+  Status status;                            // why it is not a success although results were written
 };
 
 /// Runs the system over all frames of `source` and writes the results. A frame that cannot be used is skipped, counted

@@ -47,6 +47,19 @@ Json dynamic_to_json(const DynamicTotals& d, std::uint64_t frames) {
           {"masked_share", mean(d.masked_share, frames)}};
 }
 
+Json sub_maps_to_json(const SlamStatistics& slam) {
+  Json apart = Json::array();
+  for (const SubMapStatistics& s : slam.apart)
+    apart.push_back({{"number", number_of(s.sub_map)},
+                     {"tracked", s.tracked},
+                     {"key_frames", s.key_frames},
+                     {"landmarks", s.landmarks}});
+  return {{"begun", slam.sub_maps_begun},
+          {"joined", slam.sub_maps_joined},
+          {"main", number_of(slam.sub_map)},
+          {"apart", apart}};
+}
+
 }  // namespace
 
 std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) {
@@ -71,6 +84,7 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
                {"relocalised", slam.relocalised},
                {"revisits", slam.revisits},
                {"loops", slam.loops},
+               {"sub_maps", sub_maps_to_json(slam)},
                {"dynamic", dynamic_to_json(slam.dynamic, slam.frames)},
                {"notices", slam.notices},
                {"stages_ms", stages},
@@ -97,11 +111,22 @@ std::string format_statistics(const RunRecord& run, const SlamStatistics& slam) 
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::vector<std::string> format_apart(const SlamStatistics& slam) {
+  std::vector<std::string> lines;
+  for (const SubMapStatistics& s : slam.apart)
+    lines.push_back(
+        fmt::format("sub-map {0} was never joined with sub-map {1}, whose results these are: {2} frames, {3} "
+                    "key frames, {4} landmarks in trajectory.{0}.txt, keyframes.{0}.txt, map.{0}.ply",
+                    number_of(s.sub_map), number_of(slam.sub_map), s.tracked, s.key_frames, s.landmarks));
+  return lines;
+}
+
 std::string format_summary(const RunRecord& run, const SlamStatistics& slam) {
   std::string out = fmt::format("{} frames, {} tracked, {} lost", run.read, slam.tracked, slam.lost);
   if (run.skipped > 0) out += fmt::format(", {} skipped as unusable (see run.log)", run.skipped);
   if (run.dropped > 0) out += fmt::format(", {} dropped to keep pace", run.dropped);
   out += fmt::format("; {} key frames, {} landmarks\n", slam.key_frames, slam.landmarks);
+  for (const std::string& line : format_apart(slam)) out += line + "\n";
   if (!run.map.empty())
     out += fmt::format("{}: began with {} key frames, {} landmarks, loaded in {:.2f} s\n", run.map,
                        slam.loaded_key_frames, slam.loaded_landmarks, run.map_load_s);

@@ -30,6 +30,8 @@ struct RunRecord {
 
 /// Content of stats.json.
 std::string format_statistics(const RunRecord& run, const SlamStatistics& slam);
+/// A line for each sub-map that is not in the results of the main one.
+std::vector<std::string> format_apart(const SlamStatistics& slam);
 /// Some lines for people.
 std::string format_summary(const RunRecord& run, const SlamStatistics& slam);
 

@@ -37,6 +37,24 @@ TEST(RunStatistics, JsonHoldsEveryNumber) {
   EXPECT_DOUBLE_EQ(json["peak_memory_mb"].get<double>(), 123);
 }
 
+TEST(RunStatistics, SubMapsApartAreNamedAndNotCountedToTheMainOne) {
+  SlamStatistics s = statistics();
+  s.sub_maps_begun = 2, s.sub_maps_joined = 1;
+  s.sub_map = SubMapId(1);
+  s.apart.push_back({SubMapId(0), 7, 3, 99});
+  const auto json = nlohmann::json::parse(format_statistics(record(), s))["sub_maps"];
+  EXPECT_EQ(json["begun"], 2);
+  EXPECT_EQ(json["joined"], 1);
+  EXPECT_EQ(json["main"], 2);
+  ASSERT_EQ(json["apart"].size(), 1u);
+  EXPECT_EQ(json["apart"][0]["number"], 1);
+  EXPECT_EQ(json["apart"][0]["tracked"], 7);
+  EXPECT_EQ(json["apart"][0]["key_frames"], 3);
+  EXPECT_EQ(json["apart"][0]["landmarks"], 99);
+  EXPECT_THAT(format_summary(record(), s), ::testing::HasSubstr("sub-map 1 was never joined with sub-map 2"));
+  EXPECT_THAT(format_summary(record(), statistics()), ::testing::Not(::testing::HasSubstr("sub-map")));
+}
+
 TEST(RunStatistics, PixelsOfTrueMasksAreMediansOverFrames) {
   RunRecord r = record();
   r.truth.emplace();
