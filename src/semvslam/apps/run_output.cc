@@ -114,7 +114,7 @@ Status RunOutput::write_results(const SubMapResults& main, const std::map<SubMap
   };
   write_all(main, [](const char* name) { return std::string(name); });
   for (const auto& [sub_map, results] : apart)
-    write_all(results, [&](const char* name) { return numbered(name, sub_map).string(); });
+    write_all(results, [id = sub_map](const char* name) { return numbered(name, id).string(); });
   if (!first) return first;
   std::error_code code;  // what cannot be removed are poses that are elsewhere as well
   for (const auto& [sub_map, live] : live_)

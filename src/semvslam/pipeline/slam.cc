@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
-#include <ranges>
 
 #include "semvslam/data/file_io.h"
 #include "semvslam/map/map_file.h"
@@ -45,9 +44,8 @@ struct Slam::Impl {
   template <typename Visit>
   void for_key_frames_of_session(const Map& map, std::optional<SubMapId> sub_map, const Visit& visit) const {
     const SubMapId wanted = sub_map ? *sub_map : main_sub_map(map);
-    const auto first = map.key_frames().lower_bound(map.first_of_session());
-    for (const auto& [id, key_frame] : std::ranges::subrange(first, map.key_frames().end()))
-      if (key_frame.sub_map == wanted) visit(key_frame);
+    for (auto it = map.key_frames().lower_bound(map.first_of_session()); it != map.key_frames().end(); ++it)
+      if (it->second.sub_map == wanted) visit(it->second);
   }
 
   const Config config;
@@ -324,8 +322,8 @@ std::vector<KeyFrameMask> Slam::key_frame_masks(std::optional<SubMapId> sub_map)
   return impl_->mapping.query([&](const Mapper& mapper) {
     std::vector<KeyFrameMask> masks;
     impl_->for_key_frames_of_session(mapper.map(), sub_map, [&](const KeyFrame& key_frame) {
-      masks.push_back({key_frame.frame, key_frame.stamp, key_frame.features->moving,
-                       impl_->classes.of(key_frame.frame)});
+      masks.push_back(
+          {key_frame.frame, key_frame.stamp, key_frame.features->moving, impl_->classes.of(key_frame.frame)});
     });
     return masks;
   });
