@@ -14,9 +14,9 @@ class MapTest : public testing::Test {
   MapTest() : map(std::make_shared<ObservationModel>(vga(), NoiseModel{}, level_scales(OrbOptions{}))) {}
 
   KeyFrameId add_key_frame(double x_m, SubMapId sub_map = SubMapId(0)) {
-    constexpr int kFeatures = 6;
+    constexpr int kSeen = 6;
     auto f = std::make_shared<FrameFeatures>();
-    for (int i = 0; i < kFeatures; ++i) {
+    for (int i = 0; i < kSeen; ++i) {
       f->orb.keypoints.push_back({100.f + 50.f * static_cast<float>(i), 240.f, 1.f, 0.f, 0});
       f->orb.descriptors.push_back({static_cast<std::uint64_t>(i), 0, 0, 0});
       f->x_px.push_back(f->orb.keypoints.back().x_px);
