@@ -52,8 +52,8 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
     times_.loop_ms = lap_ms(lap);
   }
   if (!is_first(id)) {
+    if (joined_) adjust_joined(stop);
     fuse_with_neighbours(id);
-    if (joined_) fuse_around(id);
     times_.fuse_ms = lap_ms(lap);
     adjust_neighbourhood(id, stop);
     times_.bundle_ms = lap_ms(lap);
@@ -68,9 +68,9 @@ std::shared_ptr<const LocalMap> Mapper::step(const NewKeyFrame& key_frame, std::
 
 void Mapper::join(KeyFrameId id) {
   joined_.reset();
-  const std::optional<Relocalisation> place = join_finder_.find(map_, places_, id);
-  if (!place) return;
-  joined_ = join_sub_maps(map_, id, *place);
+  const std::vector<Sighting> sightings = join_finder_.find(map_, places_, id);
+  if (sightings.empty()) return;
+  joined_ = join_sub_maps(map_, sightings);
   ++joins_;
   loop_finder_ = LoopFinder(options_.loop);  // what it found was in another world
 }
@@ -153,11 +153,10 @@ void Mapper::fuse_with_neighbours(KeyFrameId id) {
     if (landmark.valid()) map_.refresh_landmark(landmark);
 }
 
-void Mapper::fuse_around(KeyFrameId id) {
-  std::vector<Covisible> around = map_.covisible(id, options_.min_shared);
-  if (around.size() > static_cast<std::size_t>(options_.fuse_key_frames))
-    around.resize(static_cast<std::size_t>(options_.fuse_key_frames));
-  for (const Covisible& c : around) fuse_with_neighbours(c.key_frame);
+void Mapper::adjust_joined(std::stop_token stop) {
+  adjust_all_of(joined_->into, stop);
+  for (const KeyFrameId id : joined_->moved) fuse_with_neighbours(id);
+  adjust_all_of(joined_->into, stop);
 }
 
 void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target) {
@@ -207,14 +206,15 @@ void Mapper::fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId targ
   }
 }
 
+void Mapper::adjust_all_of(SubMapId sub_map, std::stop_token stop) {
+  const std::vector<KeyFrameId> window = map_.key_frames_of(sub_map);
+  if (window.size() < 2 || window.back() < map_.first_of_session()) return;
+  // What bends a whole map (drift that a revisit has spread) gains little per step: five steps would leave most of it.
+  adjust(window, {.robust_iterations = 25, .final_iterations = 15, .relative_cost_tolerance = 1e-6}, stop);
+}
+
 void Mapper::adjust_all(std::stop_token stop) {
-  for (const auto& [sub_map, first] : map_.sub_maps()) {
-    const std::vector<KeyFrameId> window = map_.key_frames_of(sub_map);
-    if (window.size() < 2 || window.back() < map_.first_of_session()) continue;
-    // What bends a whole map (drift that a revisit has spread) gains little per step: five steps would leave most of
-    // it.
-    adjust(window, {.robust_iterations = 25, .final_iterations = 15, .relative_cost_tolerance = 1e-6}, stop);
-  }
+  for (const auto& [sub_map, first] : map_.sub_maps()) adjust_all_of(sub_map, stop);
 }
 
 void Mapper::adjust_neighbourhood(KeyFrameId id, std::stop_token stop) {

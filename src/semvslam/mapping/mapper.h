@@ -95,8 +95,10 @@ class Mapper {
   void cull_landmarks(KeyFrameId newest);
   std::vector<KeyFrameId> fusion_partners(KeyFrameId id) const;
   void fuse_with_neighbours(KeyFrameId id);
-  /// After a join: what its neighbours see in both parts, beside what it sees itself.
-  void fuse_around(KeyFrameId id);
+  /// After a join. Its sightings are often of things that one side knows from far away only, and has some centimetres
+  /// off: before what both have seen can be fused, everything moves, as at the end of a run, and once more after it.
+  void adjust_joined(std::stop_token stop);
+  void adjust_all_of(SubMapId sub_map, std::stop_token stop);
   /// Searches landmarks in a key frame's image; adds observations and fuses duplicates.
   void fuse_into(const std::vector<LandmarkId>& landmarks, KeyFrameId target);
   void adjust_neighbourhood(KeyFrameId id, std::stop_token stop);

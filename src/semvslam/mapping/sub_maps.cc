@@ -1,6 +1,7 @@
 #include "semvslam/mapping/sub_maps.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace semvslam {
 
@@ -15,31 +16,33 @@ void SubMapOptions::add_to(ConfigSchema& s) {
         "joined; each is looked for as a lost frame is (mapping.relocalise.*)");
 }
 
-std::optional<Relocalisation> JoinFinder::find(const Map& map, const PlaceIndex& places, KeyFrameId id) {
+std::vector<Sighting> JoinFinder::find(const Map& map, const PlaceIndex& places, KeyFrameId id) {
   const KeyFrame& key_frame = *map.key_frame(id);
-  if (map.sub_maps().size() < 2) return std::nullopt;
+  if (map.sub_maps().size() < 2) return {};
   std::optional<Relocalisation> place =
       relocalise(map, places, *key_frame.features, search_, {.without = key_frame.sub_map});
-  if (!place) return std::nullopt;
+  if (!place) return {};
   const SE3& camera_from_own = key_frame.camera_from_world;
   Candidate now{key_frame.sub_map, map.sub_map_of(place->key_frame),
-                place->camera_from_world.inverse() * camera_from_own, 1};
+                place->camera_from_world.inverse() * camera_from_own};
   if (candidate_ && candidate_->own == now.own && candidate_->other == now.other &&
       agree(candidate_->other_from_own, now.other_from_own, camera_from_own, agreement_))
-    now.agreeing += candidate_->agreeing;
-  candidate_ = now;
-  if (now.agreeing < options_.agreeing_key_frames) return std::nullopt;
-  candidate_.reset();
-  return place;
+    now.agreeing = std::move(candidate_->agreeing);
+  now.agreeing.push_back({id, std::move(*place)});
+  candidate_ = std::move(now);
+  if (candidate_->agreeing.size() < static_cast<std::size_t>(options_.agreeing_key_frames)) return {};
+  return std::exchange(candidate_, std::nullopt)->agreeing;
 }
 
-SubMapJoin join_sub_maps(Map& map, KeyFrameId id, const Relocalisation& place) {
-  const KeyFrame& key_frame = *map.key_frame(id);
-  const SubMapId own = key_frame.sub_map, other = map.sub_map_of(place.key_frame);
-  const SE3 other_from_own = place.camera_from_world.inverse() * key_frame.camera_from_world;
-  const SubMapJoin join{std::max(own, other), std::min(own, other)};
+SubMapJoin join_sub_maps(Map& map, const std::vector<Sighting>& sightings) {
+  const Sighting& best = *std::ranges::max_element(sightings, {}, [](const Sighting& s) { return s.place.inliers; });
+  const SubMapId own = map.sub_map_of(best.key_frame), other = map.sub_map_of(best.place.key_frame);
+  const SE3 other_from_own = best.place.camera_from_world.inverse() * map.camera_from_world(best.key_frame).value();
+  const SubMapId younger = std::max(own, other);
+  SubMapJoin join{younger, std::min(own, other), map.key_frames_of(younger)};
   map.join(join.from, join.into, join.from == own ? other_from_own : other_from_own.inverse());
-  fuse_matches(map, id, place.matches());
+  for (const Sighting& s : sightings)
+    if (map.key_frame(s.key_frame) != nullptr) fuse_matches(map, s.key_frame, s.place.matches());
   return join;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "semvslam/mapping/loop.h"
 #include "semvslam/mapping/relocalise.h"
@@ -19,6 +20,12 @@ struct SubMapOptions {
   void add_to(ConfigSchema& schema);
 };
 
+/// A key frame that was found in another sub-map than its own.
+struct Sighting {
+  KeyFrameId key_frame;
+  Relocalisation place;
+};
+
 /// Looks for each new key frame in the other sub-maps, as a lost frame is looked for in the map; several must find the
 /// same motion between the same two worlds.
 class JoinFinder {
@@ -27,14 +34,14 @@ class JoinFinder {
   JoinFinder(const SubMapOptions& options, const RelocaliseOptions& search, const LoopOptions& agreement)
       : options_(options), search_(search), agreement_(agreement) {}
 
-  /// @param id the newest key frame; one call for each. @return where it is in another sub-map, once enough agree.
-  std::optional<Relocalisation> find(const Map& map, const PlaceIndex& places, KeyFrameId id);
+  /// @param id the newest key frame; one call for each. @return those that agree, once they are enough: else none.
+  std::vector<Sighting> find(const Map& map, const PlaceIndex& places, KeyFrameId id);
 
  private:
   struct Candidate {
     SubMapId own, other;
-    SE3 other_from_own;
-    int agreeing = 0;  // key frames, one after the other; those that found nothing do not count
+    SE3 other_from_own;                // as the newest has it
+    std::vector<Sighting> agreeing{};  // one after the other; key frames that found nothing do not count
   };
 
   SubMapOptions options_;
@@ -46,10 +53,12 @@ class JoinFinder {
 /// What became a part of what.
 struct SubMapJoin {
   SubMapId from, into;
+  std::vector<KeyFrameId> moved;  // the key frames
 };
 
-/// Moves the younger of two sub-maps into the world of the older, of which it becomes a part, and fuses what the key
-/// frame sees in both. @param place of key frame `id`, in another sub-map than its own.
-SubMapJoin join_sub_maps(Map& map, KeyFrameId id, const Relocalisation& place);
+/// Moves the younger of two sub-maps into the world of the older, of which it becomes a part, as the sighting has it
+/// that most landmarks agree with, and fuses what the key frames see in both. @param sightings at least one, all
+/// between the same two sub-maps; some may be out of date.
+SubMapJoin join_sub_maps(Map& map, const std::vector<Sighting>& sightings);
 
 }  // namespace semvslam
