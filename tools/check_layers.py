@@ -31,17 +31,19 @@ ALLOWED = {
     "pipeline": CORE,
     "web": {"eval", "data", "geometry"},
     "apps": {"pipeline", "eval", "render", "web", "data"} | CORE,
+    "python": {"pipeline", "eval", "data"} | CORE,
 }
 
 # library -> (how its headers begin, modules whose sources may include them). `map` and `pipeline` see frames through data.
 FOREIGN = {
-    "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "dense", "tracking", "map"}),
+    "OpenCV": (re.compile(r"opencv2/"), {"geometry", "data", "feature", "render", "motion", "semantic", "dynamic", "dense", "tracking", "map", "python"}),
     "Ceres": (re.compile(r"ceres/"), {"solve"}),
     "OctoMap": (re.compile(r"octomap/"), set()),
     "OpenVINO": (re.compile(r"openvino/"), {"semantic"}),
     "ONNX Runtime": (re.compile(r"onnxruntime"), {"semantic"}),
     "CLI11": (re.compile(r"CLI/"), {"apps"}),
     "cpp-httplib": (re.compile(r"httplib\.h"), {"web"}),
+    "pybind11": (re.compile(r"pybind11/"), {"python"}),
     "nlohmann-json": (re.compile(r"nlohmann/"), {"apps", "eval", "semantic", "web"}),
     "yaml-cpp": (re.compile(r"yaml-cpp/"), {"base", "data", "semantic"}),
 }

@@ -18,7 +18,7 @@ constexpr double kLeastScore = 0.02;  // average precision wants the unsure ones
 
 struct EvalSegArguments {
   std::string labels, images, json;
-  double sure = kLeastScoreOfStills;
+  double sure = Segmenter::kLeastScoreOfStills;
   SegmenterOptions options;
 };
 

@@ -31,18 +31,6 @@ constexpr std::uint64_t kSkipsShown = 3;  // on the terminal; all are in run.log
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-const char* state_name(TrackingState state) {
-  switch (state) {
-    case TrackingState::kInitializing:
-      return "initializing";
-    case TrackingState::kTracking:
-      return "tracking";
-    case TrackingState::kLost:
-      return "lost";
-  }
-  return "";
-}
-
 /// Writes stats.json about once a second from a thread of its own: asking the system for its statistics waits for a
 /// mapping step, and replacing a file waits for the disk; neither may stand between two frames.
 class Checkpoints {
@@ -115,7 +103,7 @@ class DebugFrameSink final : public Sink {
  public:
   DebugFrameSink(std::filesystem::path folder, RunOutput& output) : folder_(std::move(folder)), output_(output) {}
   void on_frame(const RgbdFrame& frame, const TrackResult& result) override {
-    const cv::Mat picture = draw_dynamic(frame, *result.dynamic, state_name(result.state));
+    const cv::Mat picture = draw_dynamic(frame, *result.dynamic, std::string(to_string(result.state)));
     const Status status = write_picture(folder_ / fmt::format("{:06}.png", frame.id.value), picture);
     if (!status && !failed_) output_.log("warning", status.error().message);
     failed_ = !status;
@@ -198,7 +186,7 @@ void Session::skip(const Error& error) {
 void Session::note_state(const TrackResult& result) {
   if (result.state == state_) return;
   output_.log("info", fmt::format("frame {} at {:.6f} s: {} -> {}", result.frame.value, result.stamp.seconds(),
-                                  state_name(state_), state_name(result.state)));
+                                  to_string(state_), to_string(result.state)));
   state_ = result.state;
 }
 
@@ -237,7 +225,7 @@ Status Session::run() {
     } else if (const Status status = use(std::move(**next)); !status) {
       return status;
     }
-    progress_.update(record_.read, state_name(state_));
+    progress_.update(record_.read, std::string(to_string(state_)));
     checkpoints.offer([&] { return record("running"); });
   }
   progress_.end();

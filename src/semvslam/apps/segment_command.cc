@@ -53,7 +53,7 @@ CommandHandler setup_segment(CLI::App& parser) {
   auto a = std::make_shared<SegmentArguments>();
   parser.add_option("IMAGE", a->images, "pictures to segment")->required();
   parser.add_option("--out", a->out, "folder for overlays, instance images (PNG) and JSON");
-  a->options.score = kLeastScoreOfStills;
+  a->options.score = Segmenter::kLeastScoreOfStills;
   parser.add_option("--score", a->options.score, "least score of an object")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 1.0));

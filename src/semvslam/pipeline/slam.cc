@@ -69,6 +69,8 @@ struct Slam::Impl {
   DynamicTotals dynamic;
   std::vector<std::string> notices;
   FrameId next_frame{0};
+  std::optional<TimeStamp> last_stamp;  // of the frame before it
+  bool finished = false;
 };
 
 Slam::Slam(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -142,6 +144,10 @@ Status Slam::Impl::check_input(const RgbdFrame& frame) const {
   const auto invalid = [&](const std::string& what) {
     return Error{ErrorCode::kInvalidInput, fmt::format("frame {}: {}", next_frame.value, what)};
   };
+  if (finished) return invalid("the run is finished: mapping has ended, begin another one in its saved map");
+  if (last_stamp && frame.stamp <= *last_stamp)
+    return invalid(fmt::format("its time stamp, {:.9f} s, is not later than that of the frame before it, {:.9f} s",
+                               frame.stamp.seconds(), last_stamp->seconds()));
   if (frame.gray.type() != CV_8UC1 || frame.gray.size() != size)
     return invalid(fmt::format("the grey image must be 8-bit and {}x{}, it is {}x{}", size.width, size.height,
                                frame.gray.cols, frame.gray.rows));
@@ -186,6 +192,7 @@ Result<TrackResult> Slam::process_named(const RgbdFrame& frame, std::optional<Se
   Impl& s = *impl_;
   if (Status status = s.mapping.status(); !status) return status.error();
   s.next_frame.value += 1;
+  s.last_stamp = frame.stamp;
   if (s.segmentation) {
     if (Status status = s.segmentation->status(); !status) {
       s.note(status.error().message + "; going on without masks, by motion consistency");
@@ -255,6 +262,7 @@ void Slam::Impl::record(const Tracker::Output& tracked, TimeStamp stamp) {
 }
 
 Status Slam::finish() {
+  impl_->finished = true;
   Status status = impl_->mapping.finish();
   impl_->tell_events();
   return status;

@@ -111,7 +111,8 @@ class Slam {
   static Result<std::unique_ptr<Slam>> create(const Config& config, const Camera& camera, Map map);
   ~Slam();
 
-  /// Tracks one frame. Image sizes must be the camera's: anything else is an Error and the frame is not used. Where the
+  /// Tracks one frame. Image sizes must be the camera's, and its stamp later than that of the frame before: anything
+  /// else is an Error and the frame is not used. Where the
   /// configuration wants masks the frame is segmented first, on this thread; with Config::realtime beside it, and the
   /// newest mask there is serves.
   Result<TrackResult> process(const RgbdFrame& frame);
@@ -122,7 +123,8 @@ class Slam {
   std::optional<Segmentation> segment(const RgbdFrame& frame);
   void add_sink(std::shared_ptr<Sink> sink);
   /// Waits until mapping has worked off what it was given, then adjusts the whole map once more
-  /// (mapping.final_bundles); further calls do nothing. @return what went wrong in any stage.
+  /// (mapping.final_bundles); further calls do nothing, and process() is an Error. @return what went wrong in any
+  /// stage.
   Status finish();
 
   // A camera that is lost and nowhere in the map goes on in a sub-map, in a world of its own; when its place is

@@ -75,6 +75,11 @@ TEST_P(SlamTest, FramesThatDoNotFitAreRefusedAndTheRunGoesOn) {
   RgbdFrame wrong_depth = world.render(1);
   wrong_depth.depth.convertTo(wrong_depth.depth, CV_8UC1);
   EXPECT_FALSE(slam->process(wrong_depth).ok());
+  RgbdFrame again = world.render(1);
+  again.stamp = world.render(0).stamp;
+  const Result<TrackResult> not_later = slam->process(again);
+  ASSERT_FALSE(not_later.ok());
+  EXPECT_NE(not_later.error().message.find("not later"), std::string::npos) << not_later.error().message;
   RgbdFrame wrong_mask = world.render(1);
   wrong_mask.mask = cv::Mat::zeros(10, 10, CV_8UC1);
   EXPECT_FALSE(slam->process(wrong_mask).ok());

@@ -39,6 +39,9 @@ class Segmenter {
   virtual double gflops() const { return 0; }
   /// Least score of an instance beside a camera: even odds, and a mask as sure as good ones are (0.9).
   static constexpr double kLeastScore = 0.45;
+  /// The same of single pictures. Beside a camera it is less: there a person that is missed costs more than a thing
+  /// taken for one, and other frames and motion see both.
+  static constexpr double kLeastScoreOfStills = 0.55;
   /// One line for logs.
   virtual std::string description() const = 0;
 };

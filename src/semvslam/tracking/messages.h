@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "semvslam/base/ids.h"
@@ -12,6 +13,18 @@
 namespace semvslam {
 
 enum class TrackingState { kInitializing, kTracking, kLost };
+
+constexpr std::string_view to_string(TrackingState state) {
+  switch (state) {
+    case TrackingState::kInitializing:
+      return "initializing";
+    case TrackingState::kTracking:
+      return "tracking";
+    case TrackingState::kLost:
+      return "lost";
+  }
+  return "";
+}
 
 /// What tracking is to do with the map.
 enum class MapUse {
