@@ -2,7 +2,7 @@
 include(CMakePackageConfigHelpers)
 get_property(modules GLOBAL PROPERTY SEMVSLAM_MODULES)
 
-list(REMOVE_ITEM modules semvslam_apps semvslam_web)  # the program's own parts are no library for others
+list(REMOVE_ITEM modules semvslam_apps semvslam_web semvslam_download)  # the program's own parts are no library for others
 
 # One target for users who do not want to think about modules.
 add_library(semvslam_all INTERFACE)
@@ -15,7 +15,7 @@ if(TARGET semvslam_program)
   install(TARGETS semvslam_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endif()
 install(DIRECTORY src/semvslam DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-        FILES_MATCHING PATTERN "*.h" PATTERN "*_test*" EXCLUDE PATTERN "apps" EXCLUDE PATTERN "web" EXCLUDE PATTERN "python" EXCLUDE)
+        FILES_MATCHING PATTERN "*.h" PATTERN "*_test*" EXCLUDE PATTERN "apps" EXCLUDE PATTERN "web" EXCLUDE PATTERN "download" EXCLUDE PATTERN "python" EXCLUDE)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 set(SEMVSLAM_MODELS ${CMAKE_INSTALL_DATADIR}/semvslam/models)
 install(DIRECTORY models/ DESTINATION ${SEMVSLAM_MODELS} PATTERN "golden" EXCLUDE PATTERN "training_log*" EXCLUDE)

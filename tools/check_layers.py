@@ -30,7 +30,8 @@ ALLOWED = {
     "dense": {"data", "geometry"},
     "pipeline": CORE,
     "web": {"eval", "data", "geometry"},
-    "apps": {"pipeline", "eval", "render", "web", "data"} | CORE,
+    "download": set(),
+    "apps": {"pipeline", "eval", "render", "web", "download", "data"} | CORE,
     "python": {"pipeline", "eval", "data"} | CORE,
 }
 
@@ -44,6 +45,9 @@ FOREIGN = {
     "CLI11": (re.compile(r"CLI/"), {"apps"}),
     "cpp-httplib": (re.compile(r"httplib\.h"), {"web"}),
     "pybind11": (re.compile(r"pybind11/"), {"python"}),
+    "libcurl": (re.compile(r"curl/"), {"download"}),
+    "libarchive": (re.compile(r"archive(_entry)?\.h"), {"download"}),
+    "OpenSSL": (re.compile(r"openssl/"), {"download"}),
     "nlohmann-json": (re.compile(r"nlohmann/"), {"apps", "eval", "semantic", "web"}),
     "yaml-cpp": (re.compile(r"yaml-cpp/"), {"base", "data", "semantic"}),
 }

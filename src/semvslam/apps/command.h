@@ -51,6 +51,7 @@ CommandHandler setup_bench(CLI::App& parser);
 CommandHandler setup_config(CLI::App& parser);
 CommandHandler setup_eval(CLI::App& parser);
 CommandHandler setup_view(CLI::App& parser);
+CommandHandler setup_download(CLI::App& parser);
 CommandHandler setup_version(CLI::App& parser);
 
 }  // namespace semvslam

@@ -19,6 +19,7 @@ std::span<const Command> commands() {
       Command{"render", "write a rendered recording with exact ground truth and masks", setup_render},
       Command{"map", "what a saved map holds, and its export for other programs", setup_map},
       Command{"view", "a web page that shows recorded runs, or one that is going on", setup_view},
+      Command{"download", "fetch recordings of public benchmarks", setup_download},
       Command{"config", "show every configuration value with its meaning", setup_config},
       Command{"version", "print the version", setup_version},
   };

@@ -26,18 +26,19 @@ std::string format_progress(const ProgressState& state) {
     const auto full = static_cast<int>(kBarWidth * std::min(state.done, *state.total) / *state.total);
     out = fmt::format("[{:#<{}}{:-<{}}] {}/{}", "", full, "", kBarWidth - full, state.done, *state.total);
   } else {
-    out = fmt::format("{} frames", state.done);
+    out = fmt::format("{} {}", state.done, state.unit);
   }
-  out += fmt::format("  {:.1f} frames/s", rate);
+  out += fmt::format("  {:.1f} {}/s", rate, state.unit);
   if (!state.note.empty()) out += "  " + state.note;
   if (state.total && state.done < *state.total && rate > 0)
     out += "  " + format_time_left(static_cast<double>(*state.total - state.done) / rate);
   return out;
 }
 
-Progress::Progress(std::optional<std::uint64_t> total, bool quiet)
+Progress::Progress(std::optional<std::uint64_t> total, bool quiet, const std::string& unit)
     : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {
   state_.total = total;
+  state_.unit = unit;
 }
 
 void Progress::update(std::uint64_t done, const std::string& note) {

@@ -14,6 +14,7 @@ struct ProgressState {
   std::optional<std::uint64_t> total;
   double elapsed_s = 0;
   std::string note;  // e.g. "tracking"
+  std::string unit = "frames";
 };
 
 /// One line without its end: a bar where the total is known, count, rate, note and the time left.
@@ -23,7 +24,7 @@ std::string format_progress(const ProgressState& state);
 /// terminal, a plain line every five seconds otherwise. One thread.
 class Progress {
  public:
-  Progress(std::optional<std::uint64_t> total, bool quiet);
+  Progress(std::optional<std::uint64_t> total, bool quiet, const std::string& unit = "frames");
   ~Progress() { end(); }
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
