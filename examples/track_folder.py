@@ -12,8 +12,8 @@ out.mkdir(parents=True, exist_ok=True)
 # A live camera has no Sequence: semvslam.Camera(...) or .preset(...), realtime=True, and for each picture
 # semvslam.Frame(stamp_ns, rgb, depth).
 slam = semvslam.Slam(sequence.camera)
-for frame in sequence:
-    result = slam.process(frame)
+for frame, segmentation in slam.ahead(sequence):
+    result = slam.process(frame, segmentation)
     x, y, z = result.world_from_camera[:3, 3]
     print(f"{frame.stamp_ns / 1e9:.3f} s {result.state}: ({x:.3f}, {y:.3f}, {z:.3f}) m, {result.inliers} inliers")
 slam.finish()

@@ -153,6 +153,23 @@ class PythonTest(ProgramCase):
         self.assertEqual((480, 640), best["mask"].shape)
         self.assertTrue(x0 - 8 <= columns.min() and columns.max() <= x1 + 8 and y0 - 8 <= rows.min() and rows.max() <= y1 + 8)
 
+    def test_a_recording_is_read_and_segmented_ahead(self):
+        for mode in ("orb", "masks"):
+            sequence = self.sequence()
+            slam = semvslam.Slam(sequence.camera, mode)
+            ahead = slam.ahead(sequence)
+            for count, (frame, segmentation) in enumerate(ahead, 1):
+                self.assertEqual(mode == "masks", segmentation is not None)
+                self.assertEqual("tracking", slam.process(frame, segmentation).state)
+            self.assertEqual(self.FRAMES, count)
+            slam.finish()
+            self.assertEqual(self.FRAMES, len(slam.trajectory()))
+            for misuse in (lambda: next(sequence), lambda: slam.ahead(sequence)):
+                with self.assertRaisesRegex(ValueError, "read ahead"):
+                    misuse()
+        sequence = self.sequence()
+        next(iter(semvslam.Slam(sequence.camera, "masks").ahead(sequence)))  # left in the middle: its threads end
+
     def test_process_and_finish_from_many_threads_take_turns(self):
         sequence = self.sequence()
         frames = list(sequence)
@@ -191,6 +208,7 @@ class PythonTest(ProgramCase):
             (FileNotFoundError, "nowhere", lambda: semvslam.Slam(camera, map=self.folder / "nowhere")),
             (FileNotFoundError, "nowhere", lambda: semvslam.Segmenter(model=self.folder / "nowhere")),
             (TypeError, "", lambda: semvslam.Sequence(3)),
+            (TypeError, "", lambda: slam.ahead([])),
         ):
             with self.assertRaisesRegex(error, words):
                 act()

@@ -9,6 +9,7 @@
 #include "semvslam/data/trajectory_io.h"
 #include "semvslam/python/arrays.h"
 #include "semvslam/python/pose_list.h"
+#include "semvslam/python/recording.h"
 
 namespace py = pybind11;
 using namespace py::literals;
@@ -18,39 +19,6 @@ namespace {
 
 using Stamps = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Matrices = py::array_t<double, py::array::c_style | py::array::forcecast>;
-
-/// A recording that is read frame by frame.
-class Recording {
- public:
-  Recording(std::filesystem::path folder, const SequenceOptions& options, bool must_be_whole)
-      : folder_(std::move(folder)),
-        source_(value_or_raise(open_sequence(folder_, options))),
-        must_be_whole_(must_be_whole) {}
-
-  /// Raises StopIteration at the end.
-  RgbdFrame next() {
-    std::optional<RgbdFrame> frame;
-    Status failed;
-    {
-      const py::gil_scoped_release others_may_run;
-      Result<std::optional<RgbdFrame>> read = must_be_whole_ ? source_->next() : next_readable(*source_);
-      if (read)
-        frame = std::move(*read);
-      else
-        failed = read.error();
-    }
-    raise_if(failed);
-    if (!frame) throw py::stop_iteration();
-    return *std::move(frame);
-  }
-  const std::filesystem::path& folder() const { return folder_; }
-  const FrameSource& source() const { return *source_; }
-
- private:
-  std::filesystem::path folder_;
-  std::unique_ptr<FrameSource> source_;
-  bool must_be_whole_;
-};
 
 Camera make_camera(int width_px, int height_px, double fx_px, double fy_px, double cx_px, double cy_px, double k1,
                    double k2, double p1, double p2, double k3, double depth_units_per_m, double baseline_m,

@@ -4,82 +4,20 @@
 
 #include <algorithm>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
-#include "semvslam/map/map_file.h"
-#include "semvslam/pipeline/slam.h"
+#include "semvslam/pipeline/segment_ahead.h"
 #include "semvslam/python/arrays.h"
 #include "semvslam/python/pose_list.h"
+#include "semvslam/python/recording.h"
+#include "semvslam/python/system.h"
 
 namespace py = pybind11;
 using namespace py::literals;
 
 namespace semvslam {
 namespace {
-
-/// A Slam for callers that may have many threads: process() and finish() exclude each other.
-class System {
- public:
-  System(const Camera& camera, const std::string& mode, const py::dict& values, const py::object& map, bool localise,
-         bool deterministic, bool realtime)
-      : camera_(camera) {
-    Config config;
-    raise_if(config.apply_mode(mode));
-    set_values(config.schema(), values);
-    config.mode = mode;
-    config.mapping.frozen |= localise;
-    config.deterministic |= deterministic;
-    config.realtime |= realtime;
-    const std::filesystem::path file = map.is_none() ? std::filesystem::path() : path_of(map);
-    const py::gil_scoped_release others_may_run;
-    Result<std::unique_ptr<Slam>> slam = [&]() -> Result<std::unique_ptr<Slam>> {
-      if (file.empty()) return Slam::create(config, camera);
-      Result<Map> saved = read_map(file);
-      if (!saved) return saved.error();
-      return Slam::create(config, camera, std::move(*saved));
-    }();
-    if (!slam) {
-      const py::gil_scoped_acquire interpreter;
-      raise(slam.error());
-    }
-    slam_ = std::move(*slam);
-  }
-
-  TrackResult process(const RgbdFrame& frame, const std::optional<Segmentation>& segmentation) {
-    Result<TrackResult> result = [&] {
-      const py::gil_scoped_release others_may_run;
-      const std::lock_guard lock(mutex_);
-      return segmentation ? slam_->process(frame, segmentation) : slam_->process(frame);
-    }();
-    return value_or_raise(std::move(result));
-  }
-  void finish() {
-    const Status status = [&] {
-      const py::gil_scoped_release others_may_run;
-      const std::lock_guard lock(mutex_);
-      return slam_->finish();
-    }();
-    raise_if(status);
-  }
-  std::optional<Segmentation> segment(const RgbdFrame& frame) {
-    const py::gil_scoped_release others_may_run;
-    return slam_->segment(frame);
-  }
-  /// The queries wait for a step of mapping, which needs no interpreter.
-  template <typename Query>
-  auto ask(const Query& query) const {
-    const py::gil_scoped_release others_may_run;
-    return query(*slam_);
-  }
-  const Camera& camera() const { return camera_; }
-
- private:
-  Camera camera_;
-  std::unique_ptr<Slam> slam_;
-  std::mutex mutex_;
-};
 
 std::optional<SubMapId> sub_map_of(const std::optional<std::uint32_t>& number) {
   return number ? std::optional(SubMapId(*number)) : std::nullopt;
@@ -127,6 +65,51 @@ py::list masks_of(const System& system, const std::optional<std::uint32_t>& sub_
   py::list out;
   for (const KeyFrameMask& mask : masks) out.append(py::make_tuple(mask.stamp.ns, bools_of(mask.moving.mask(), size)));
   return out;
+}
+
+/// The frames of a recording with their segmentations, which threads make ahead of whoever iterates.
+class FramesAhead {
+ public:
+  /// Both must outlive this object.
+  FramesAhead(System& system, Recording& recording) : must_be_whole_(recording.must_be_whole()) {
+    Slam& slam = system.slam();
+    const Config& config = slam.effective_config();
+    SegmentAhead::Segment segment;
+    if (config.needs_segmentation() && !config.deterministic && !config.realtime)
+      segment = [&slam](const RgbdFrame& frame) { return slam.segment(frame); };
+    ahead_ = std::make_unique<SegmentAhead>(recording.lend(), std::move(segment),
+                                            static_cast<std::size_t>(config.segment_at_once), kWaiting);
+  }
+  ~FramesAhead() {
+    const py::gil_scoped_release others_may_run;
+    ahead_.reset();
+  }
+  FramesAhead(const FramesAhead&) = delete;
+  FramesAhead& operator=(const FramesAhead&) = delete;
+
+  py::tuple next() {
+    for (;;) {
+      Result<std::optional<SegmentedFrame>> frame = [&] {
+        const py::gil_scoped_release others_may_run;
+        return ahead_->next();
+      }();
+      if (!frame && !must_be_whole_ && !ahead_->fatal()) continue;
+      std::optional<SegmentedFrame> read = value_or_raise(std::move(frame));
+      if (!read) throw py::stop_iteration();
+      return py::make_tuple(std::move(read->frame), std::move(read->segmentation));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kWaiting = 2;  // frames
+  bool must_be_whole_;
+  std::unique_ptr<SegmentAhead> ahead_;
+};
+
+void bind_ahead(py::module_& m) {
+  py::class_<FramesAhead>(m, "FramesAhead", "Iterates over (Frame, Segmentation or None).")
+      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__next__", &FramesAhead::next);
 }
 
 void bind_result(py::module_& m) {
@@ -179,6 +162,11 @@ void bind_system(py::module_& m) {
       .def("segment", &System::segment, "frame"_a,
            "Segments a Frame for process(), on any thread, to be ahead of tracking -> Segmentation, or None where the "
            "mode wants none. Not with realtime.")
+      .def(
+          "ahead", [](System& self, Recording& sequence) { return std::make_unique<FramesAhead>(self, sequence); },
+          py::keep_alive<0, 1>(), py::keep_alive<0, 2>(), "sequence"_a,
+          "Reads a Sequence and segments its frames on threads, ahead of tracking: iterate over it, and give both to "
+          "process(). `segment.at_once` says how many at the same time.")
       .def("finish", &System::finish, "Waits for mapping, then adjusts the whole map once more.")
       .def(
           "trajectory",
@@ -217,6 +205,7 @@ void bind_system(py::module_& m) {
 }  // namespace
 
 void bind_slam(py::module_& m) {
+  bind_ahead(m);
   bind_result(m);
   bind_system(m);
 }
