@@ -11,7 +11,7 @@ import subprocess
 import time
 import unittest
 
-from program_testing import PROGRAM, ProgramCase, call
+from program_testing import PROGRAM, ProgramCase, call, poses
 
 RESULTS = {"trajectory.txt", "keyframes.txt", "map.ply", "stats.json", "config.yaml", "run.log"}
 
@@ -230,9 +230,10 @@ class ProgramTest(ProgramCase):
 
     def test_kill_leaves_what_was_tracked(self):
         process = self.start_slow_run()
-        wait_for(lambda: (self.out / "stats.json").exists())
+        wait_for(lambda: (self.out / "map.ply").exists())
         process.kill()
         process.communicate(timeout=60)
+        self.assertLess(0, len(poses(self.out / "keyframes.txt")))
         lines = (self.out / "trajectory.txt").read_text().splitlines()
         self.assertLess(5, len(lines))
         self.assertEqual({8}, {len(line.split()) for line in lines[1:]})

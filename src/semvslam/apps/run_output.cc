@@ -103,6 +103,11 @@ Status RunOutput::write(const std::string& name, std::string_view content) const
   return write_file_atomically(folder_ / name, content);
 }
 
+Status RunOutput::write_map(const Trajectory& key_frames, std::span<const Eigen::Vector3d> landmarks) const {
+  if (Status status = write_trajectory(folder_ / "keyframes.txt", key_frames); !status) return status;
+  return write("map.ply", format_ply(landmarks));
+}
+
 Status RunOutput::write_results(const SubMapResults& main, const std::map<SubMapId, SubMapResults>& apart) {
   Status first;
   const auto write_all = [&](const SubMapResults& results, const auto& name) {

@@ -34,7 +34,8 @@ std::filesystem::path numbered(const std::filesystem::path& path, SubMapId sub_m
 
 /// The folder that a run writes to: trajectory.txt, keyframes.txt, map.ply, stats.json, config.yaml, run.log. While the
 /// run goes on, trajectory.txt grows by the poses as they were tracked and run.log by lines, both handed to the
-/// operating system within a second; at the end the trajectory is replaced in one step by the refined one. No file ever
+/// operating system within a second; the others are replaced in one step whenever they are written, and so is the
+/// trajectory at the end, by the refined one. No file ever
 /// holds poses of two worlds: those in another sub-map than the first go to trajectory.2.txt and so on as they are
 /// tracked, and at the end those in another than the main one. One thread.
 class RunOutput {
@@ -51,6 +52,9 @@ class RunOutput {
 
   /// Replaces a file of the folder in one step.
   Status write(const std::string& name, std::string_view content) const;
+  /// The map of a sub-map as far as it is, for those who look on and for the case that the run is killed. Of the first
+  /// one alone: others may become parts of it.
+  Status write_map(const Trajectory& key_frames, std::span<const Eigen::Vector3d> landmarks) const;
   /// The three results at the end, of the main sub-map and of those apart from it. All are tried; the first Error is
   /// returned.
   Status write_results(const SubMapResults& main, const std::map<SubMapId, SubMapResults>& apart);

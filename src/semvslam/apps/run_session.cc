@@ -31,15 +31,17 @@ constexpr std::uint64_t kSkipsShown = 3;  // on the terminal; all are in run.log
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Writes stats.json about once a second from a thread of its own: asking the system for its statistics waits for a
-/// mapping step, and replacing a file waits for the disk; neither may stand between two frames.
+/// Writes stats.json about once a second, and the map every few seconds, from a thread of its own: asking the system
+/// waits for a mapping step, and replacing a file waits for the disk; neither may stand between two frames.
 class Checkpoints {
  public:
   Checkpoints(const Slam& slam, const RunOutput& output) : slam_(slam), output_(output) {
     thread_ = std::jthread([this] {
-      while (const auto record = records_.pop())
-        // A failure here shows again, and is reported, when the final statistics are written.
+      // A failure here shows again, and is reported, when the final results are written.
+      while (const auto record = records_.pop()) {
         static_cast<void>(output_.write("stats.json", format_statistics(*record, slam_.statistics())));
+        write_map();
+      }
     });
   }
   ~Checkpoints() { records_.close(); }
@@ -54,9 +56,18 @@ class Checkpoints {
   }
 
  private:
+  void write_map() {
+    if (seconds_since(last_map_) < 5) return;
+    const std::vector<Eigen::Vector3d> landmarks = slam_.landmark_positions(SubMapId(0));
+    if (landmarks.empty()) return;
+    static_cast<void>(output_.write_map(slam_.key_frame_trajectory(SubMapId(0)), landmarks));
+    last_map_ = Clock::now();
+  }
+
   const Slam& slam_;
   const RunOutput& output_;
   Clock::time_point last_ = Clock::now() - std::chrono::seconds(10);
+  Clock::time_point last_map_ = last_;  // the thread's own
   BoundedQueue<RunRecord> records_{1};
   std::jthread thread_;  // last: ends before what it uses
 };

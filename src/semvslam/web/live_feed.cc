@@ -19,7 +19,7 @@ bool is_running_now(const std::filesystem::path& folder) {
   return statistics && describe_run(*statistics, "").is_running;
 }
 
-/// Files that are written once, at the end of a run.
+/// Files that are written as a whole: at the end of a run, two of them now and then before.
 bool is_result(const std::string& name) {
   constexpr const char* kResults[] = {"keyframes.txt", "map.ply", "dense.ply", "evaluation.json"};
   return std::find(std::begin(kResults), std::end(kResults), name) != std::end(kResults);

@@ -66,8 +66,7 @@ Status add_cloud(const fs::path& folder, const ViewOptions& options, ViewedRun& 
     }
     if (cloud.error().code != ErrorCode::kNotFound) run.remarks.push_back(cloud.error().message);
   }
-  run.remarks.push_back(options.live ? "no map yet: it is written at the end of a run"
-                                     : "no points: neither map.ply nor dense.ply can be shown");
+  run.remarks.push_back(options.live ? "no map yet" : "no points: neither map.ply nor dense.ply can be shown");
   return Status::success();
 }
 

@@ -3,6 +3,8 @@ const styleColour = (name) => getComputedStyle(document.documentElement).getProp
 
 const kOutgrown = 1.2;  // a live way that reaches so much farther is shown as a whole again, unless the reader moved the view
 
+const isSamePlace = (a, b) => b !== undefined && Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) < 1e-6;
+
 // The page: what is shown, what the controls do.
 class App {
   constructor(renderer, json) {
@@ -239,11 +241,19 @@ class App {
     });
   }
 
-  // The folder's files are others than before; so may the world be that they are in.
+  // The folder's files are others than before. In the same world, as while a run goes on, the reader's view stays.
   reload(json) {
+    const {time, followsNewest} = this, begin = this.runs[0].track.positions[0];
     this.load(json);
-    this.orbit.setUp(json.up);
-    this.showWhole();
+    if (begin && isSamePlace(begin, this.runs[0].track.positions[0])) {
+      this.followsNewest = followsNewest && this.live !== null;
+      this.time = this.followsNewest ? this.duration : Math.min(time, this.duration);
+      this.orbit.radius = this.extent.radius;
+    } else {
+      this.orbit.setUp(json.up);
+      this.showWhole();
+    }
+    byId("newest").setAttribute("aria-pressed", this.followsNewest);
     this.updateLines();
   }
 
