@@ -16,8 +16,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kResultFiles[] = {"trajectory.txt", "keyframes.txt",   "map.ply",       "stats.json",
-                                        "config.yaml",    "evaluation.json", "evaluation.svg"};
+/// The last one is written only where it is asked for, but `view` shows it as this run's wherever it is.
+constexpr const char* kResultFiles[] = {"trajectory.txt", "keyframes.txt",   "map.ply",        "stats.json",
+                                        "config.yaml",    "evaluation.json", "evaluation.svg", "dense.ply"};
 
 /// The name without the number that numbered() puts in; as it is where there is none.
 std::string without_number(const fs::path& name) {

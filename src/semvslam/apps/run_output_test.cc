@@ -74,11 +74,11 @@ TEST(Numbered, TheNumberStandsBeforeTheExtension) {
 TEST_F(RunOutputTest, EarlierResultsAreRemoved) {
   fs::create_directories(out_);
   std::ofstream(out_ / "stats.json") << "old";
-  for (const char* name : {"trajectory.2.txt", "map.12.ply"}) std::ofstream(out_ / name) << "old";
+  for (const char* name : {"trajectory.2.txt", "map.12.ply", "dense.ply"}) std::ofstream(out_ / name) << "old";
   for (const char* name : {"mine.txt", "mine.2.txt", "trajectory.old.txt", "map.2.txt"})
     std::ofstream(out_ / name) << "kept";
   ASSERT_TRUE(RunOutput::create(out_));
-  for (const char* name : {"stats.json", "trajectory.2.txt", "map.12.ply"})
+  for (const char* name : {"stats.json", "trajectory.2.txt", "map.12.ply", "dense.ply"})
     EXPECT_FALSE(fs::exists(out_ / name)) << name;
   for (const char* name : {"mine.txt", "mine.2.txt", "trajectory.old.txt", "map.2.txt"})
     EXPECT_TRUE(fs::exists(out_ / name)) << name;
