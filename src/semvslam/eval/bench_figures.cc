@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "semvslam/eval/bar_chart.h"
@@ -19,7 +18,6 @@
 namespace semvslam {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kWidth_px = 960, kTimeChartHeight_px = 210;
 constexpr std::size_t kFewestColumns = 2, kMostColumns = 3;  // of trajectories
 constexpr std::size_t kDifferences = 200;                    // lines between truth and estimate at most
@@ -39,8 +37,8 @@ ChartSeries differences(const AbsoluteError& e, std::array<int, 2> plane) {
   ChartSeries out{"", kDrawnDifferenceColour, {}, {}, false, 0.8};
   const std::size_t step = std::max<std::size_t>(1, e.reference.size() / kDifferences);
   for (std::size_t i = 0; i < e.reference.size(); i += step) {
-    out.x.insert(out.x.end(), {e.reference[i][plane[0]], e.estimate[i][plane[0]], kNan});
-    out.y.insert(out.y.end(), {e.reference[i][plane[1]], e.estimate[i][plane[1]], kNan});
+    out.x.insert(out.x.end(), {e.reference[i][plane[0]], e.estimate[i][plane[0]], kNoValue});
+    out.y.insert(out.y.end(), {e.reference[i][plane[1]], e.estimate[i][plane[1]], kNoValue});
   }
   return out;
 }
@@ -135,7 +133,7 @@ BarChart error_bars(const BenchResults& results, const std::vector<BenchCell>& c
     for (const std::string& sequence : results.sequences) {
       const BenchCell* cell = find_cell(cells, sequence, mode);
       const Spread s = cell == nullptr ? Spread{} : cell->over(number);
-      series.values.push_back(s.count == 0 ? kNan : scale * s.median);
+      series.values.push_back(s.count == 0 ? kNoValue : scale * s.median);
     }
     chart.series.push_back(std::move(series));
   }
@@ -153,7 +151,7 @@ void add_published(std::span<const DrawnSystem> systems, BarChart& chart) {
       BarSeries series{std::string(name), colour, {}};
       for (const std::string& sequence : chart.groups) {
         const auto error = system.ate_rmse_m(sequence);
-        series.values.push_back(error ? kMmPerM * *error : kNan);
+        series.values.push_back(error ? kMmPerM * *error : kNoValue);
       }
       chart.series.push_back(std::move(series));
     }

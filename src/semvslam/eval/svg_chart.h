@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,9 @@ namespace semvslam {
 inline constexpr const char* kTruthColour = "#555555";
 inline constexpr const char* kEstimateColour = "#0868ac";
 inline constexpr const char* kAgainstColour = "#e6740b";
+
+/// Breaks a line; in a bar chart, no bar.
+inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 /// One line of a chart. A NaN in x or y breaks the line.
 struct ChartSeries {

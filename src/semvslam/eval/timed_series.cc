@@ -2,15 +2,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <span>
 
 #include "semvslam/base/ranked.h"
 
 namespace semvslam {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// A longer silence than this is drawn as a gap.
 std::int64_t longest_step_ns(const std::vector<TimeStamp>& stamps) {
@@ -26,7 +23,8 @@ ChartSeries timed_series(ChartSeries series, const std::vector<TimeStamp>& stamp
                          const std::function<double(std::size_t)>& x, const std::function<double(std::size_t)>& y) {
   const std::int64_t longest_ns = longest_step_ns(stamps);
   for (std::size_t i = 0; i < stamps.size(); ++i) {
-    if (i > 0 && stamps[i].ns - stamps[i - 1].ns > longest_ns) series.x.push_back(kNan), series.y.push_back(kNan);
+    if (i > 0 && stamps[i].ns - stamps[i - 1].ns > longest_ns)
+      series.x.push_back(kNoValue), series.y.push_back(kNoValue);
     series.x.push_back(x(i));
     series.y.push_back(y(i));
   }

@@ -2,13 +2,13 @@
 
 #include <cmath>
 
+#include "semvslam/render/degree.h"
 #include "semvslam/render/random.h"
 #include "semvslam/render/room.h"
 
 namespace semvslam::render {
 namespace {
 
-constexpr double kDegree = M_PI / 180;
 constexpr double kTourSpeed_m_s = 0.34;
 
 /// Around the desks, then the great round through both rooms.

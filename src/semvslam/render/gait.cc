@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "semvslam/render/degree.h"
+
 namespace semvslam::render {
 namespace {
 
@@ -10,7 +12,6 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kDegree = M_PI / 180;
 constexpr int kSamples = 20;  // of one gait cycle, from heel strike
 
 // Degrees, flexion (dorsiflexion) positive.

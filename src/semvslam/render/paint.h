@@ -9,6 +9,9 @@ namespace semvslam::render {
 
 // Procedural images, CV_8UC3 BGR. "Tileable" ones repeat without a seam. All are functions of their arguments only.
 
+/// As OpenCV's drawing functions take colours.
+inline cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
+
 // --- surfaces of the room (paint_surfaces.cc) ---
 
 /// Wooden boards along x: tone per board, grain, pores, gaps. @param boards number across y; 1 = one piece without

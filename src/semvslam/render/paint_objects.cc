@@ -9,8 +9,6 @@
 namespace semvslam::render {
 namespace {
 
-cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
-
 /// What printed things look like: warm and muted tones more often than pure ones.
 cv::Scalar any_colour(RandomStream& random, double saturation, double low, double high) {
   const double kind = random.uniform(), strength = saturation * random.uniform(0.4, 1.0),

@@ -9,8 +9,6 @@
 namespace semvslam::render {
 namespace {
 
-cv::Scalar scalar(const cv::Vec3f& c) { return {c[0], c[1], c[2]}; }
-
 /// Blends a colour into an image through a soft ellipse. Centre and radii in pixels; strength 0..1.
 void soften(cv::Mat& image, cv::Point2f centre, cv::Size2f radii, const cv::Vec3f& colour, float strength) {
   const int x0 = std::max(0, static_cast<int>(centre.x - 2 * radii.width)),

@@ -169,7 +169,7 @@ cv::Mat paint_rug(cv::Size size, std::uint64_t seed) {
   cv::Mat image(size, CV_8UC3);
   auto tone = [&](double h, double s, double v) {
     const cv::Vec3f c = hue_colour(std::fmod(h + 1.0, 1.0), s, v);
-    return cv::Scalar(c[0], c[1], c[2]);
+    return scalar(c);
   };
   image.setTo(tone(hue, 0.65, 0.42));
   const int w = size.width, h = size.height;

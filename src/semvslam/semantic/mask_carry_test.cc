@@ -11,12 +11,6 @@ namespace {
 
 const Cutout kPerson{"person", {100, 60}, {60, 140}, 2.0, 1, true};
 
-Cutout moved(Cutout thing, int dx, int dy, double dz_m = 0) {
-  thing.at += cv::Point(dx, dy);
-  thing.depth_m += dz_m;
-  return thing;
-}
-
 struct Carried {
   CarriedMask result;
   double iou = 0;  // with the true mask of the first instance

@@ -22,6 +22,12 @@ struct Cutout {
   bool arm = false;  // stretched out to the right at a quarter of the height
 };
 
+inline Cutout moved(Cutout thing, int dx, int dy = 0, double dz_m = 0) {
+  thing.at += cv::Point(dx, dy);
+  thing.depth_m += dz_m;
+  return thing;
+}
+
 struct TestView {
   cv::Mat gray, depth;  // 8 bit; 16 bit, 5000 per metre
   Segmentation truth;

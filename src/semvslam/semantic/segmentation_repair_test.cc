@@ -12,11 +12,6 @@ namespace {
 const Cutout kWalker{"person", {40, 60}, {50, 140}, 2.0, 1, true};
 const Cutout kOther{"person", {220, 70}, {45, 130}, 1.5, 2, false};
 
-Cutout moved(Cutout thing, int dx, int dy = 0) {
-  thing.at += cv::Point(dx, dy);
-  return thing;
-}
-
 RepairOptions in_mode(const std::string& mode) {
   RepairOptions o;
   o.mode = mode;

@@ -6,13 +6,13 @@
 
 #include "semvslam/eval/association.h"
 #include "semvslam/eval/svg_chart.h"
+#include "semvslam/eval/table.h"
 #include "semvslam/eval/timed_series.h"
 
 namespace semvslam {
 namespace {
 
 constexpr double kWidth_px = 900, kPlanHeight_px = 560, kErrorHeight_px = 220, kLegendRow_px = 18, kTitle_px = 46;
-constexpr double kToMm = 1e3;
 constexpr std::size_t kMostDrawnPoses = 2000;  // per line: a drawing has no more pixels
 
 /// Two horizontal directions of the world; seen from above the second lies a quarter turn to the left of the first.
@@ -44,7 +44,7 @@ ChartSeries errors_over_time(const AbsoluteError& error, const std::string& colo
   return timed_series(
       {"", colour, {}, {}}, stamps,
       [&](std::size_t i) { return static_cast<double>(stamps[i].ns - error.stamps.front().ns) * 1e-9; },
-      [&](std::size_t i) { return kToMm * error.errors_m[shown[i]]; });
+      [&](std::size_t i) { return kMmPerM * error.errors_m[shown[i]]; });
 }
 
 }  // namespace

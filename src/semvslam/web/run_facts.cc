@@ -8,14 +8,14 @@
 #include <span>
 #include <utility>
 
+#include "semvslam/eval/table.h"
+
 namespace semvslam {
 namespace {
 
 using Json = nlohmann::ordered_json;
 using Path = std::initializer_list<const char*>;
 using Words = std::pair<std::string_view, const char*>;
-
-constexpr double kToMm = 1e3;
 
 /// Names in the files, and what they mean to a reader.
 constexpr Words kStageWords[] = {{"input", "waiting for a frame"},
@@ -142,8 +142,8 @@ Table accuracy_table(const Json& e) {
     table.rows.push_back(std::move(row));
   };
   const std::string step = text(e, {"rpe_delta"});
-  add("absolute error (ATE), mm", "ate_m", kToMm);
-  add(fmt::format("drift over {} (RPE), mm", step), "rpe_translation_m", kToMm);
+  add("absolute error (ATE), mm", "ate_m", kMmPerM);
+  add(fmt::format("drift over {} (RPE), mm", step), "rpe_translation_m", kMmPerM);
   add(fmt::format("drift over {} (RPE), degrees", step), "rpe_rotation_deg", 1);
   if (const auto share = number(e, {"estimate", "tracked_share"}))
     table.note =
@@ -266,8 +266,8 @@ Table compare_runs(const std::vector<std::string>& names, const std::vector<std:
   for (std::size_t i = 0; i < names.size(); ++i) {
     const Json s = parsed(statistics[i]), e = parsed(evaluations[i]);
     table.rows.push_back({names[i], text(s, {"mode"}), tracked_text(s),
-                          digits(number(e, {"estimate", "ate_m", "rmse"}), kToMm),
-                          digits(number(e, {"estimate", "rpe_translation_m", "rmse"}), kToMm),
+                          digits(number(e, {"estimate", "ate_m", "rmse"}), kMmPerM),
+                          digits(number(e, {"estimate", "rpe_translation_m", "rmse"}), kMmPerM),
                           digits(number(e, {"estimate", "rpe_rotation_deg", "rmse"})),
                           digits(number(s, {"stages_ms", "tracking", "mean"})), digits(number(s, {"frames_per_s"}))});
   }
