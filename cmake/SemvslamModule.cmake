@@ -50,9 +50,6 @@ function(semvslam_module name)
       # All in one process: under a sanitizer starting one takes longer than most tests do.
       add_test(NAME ${name}.all COMMAND ${name}_test --gtest_brief=1)
       set_tests_properties(${name}.all PROPERTIES TIMEOUT 1500)
-      if(name STREQUAL pipeline)
-        set_tests_properties(${name}.all PROPERTIES COST 1000)  # the longest of them begins first
-      endif()
     else()
       gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
     endif()

@@ -35,9 +35,9 @@ std::filesystem::path numbered(const std::filesystem::path& path, SubMapId sub_m
 /// The folder that a run writes to: trajectory.txt, keyframes.txt, map.ply, stats.json, config.yaml, run.log. While the
 /// run goes on, trajectory.txt grows by the poses as they were tracked and run.log by lines, both handed to the
 /// operating system within a second; the others are replaced in one step whenever they are written, and so is the
-/// trajectory at the end, by the refined one. No file ever
-/// holds poses of two worlds: those in another sub-map than the first go to trajectory.2.txt and so on as they are
-/// tracked, and at the end those in another than the main one. One thread.
+/// trajectory at the end, by the refined one. No file ever holds poses of two worlds: those in another sub-map than the
+/// first go to trajectory.2.txt and so on as they are tracked, and at the end those in another than the main one. One
+/// thread.
 class RunOutput {
  public:
   /// Makes the folder and starts trajectory.txt and run.log; results of an earlier run in it are removed first, so that

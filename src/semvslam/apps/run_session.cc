@@ -126,20 +126,12 @@ class DebugFrameSink final : public Sink {
   bool failed_ = false;
 };
 
-/// Every frame of a recording gets its own mask, made while the frames before are tracked. Where the order of all steps
-/// is fixed, or no mask may be waited for, the system segments by itself.
-SegmentAhead::Segment segment_ahead_of(const Config& config, Slam& slam) {
-  if (!config.needs_segmentation() || config.deterministic || config.realtime) return {};
-  return [&slam](const RgbdFrame& frame) { return slam.segment(frame); };
-}
-
 class Session {
  public:
   Session(FrameSource& source, const Config& config, Slam& slam, RunOutput& output, const RunOptions& options,
           RunRecord record)
       : source_(source),
-        segmented_(source, segment_ahead_of(config, slam), static_cast<std::size_t>(config.segment_at_once),
-                   kMasksAhead),
+        segmented_(source, segment_ahead_of(slam), static_cast<std::size_t>(config.segment_at_once), kMasksAhead),
         slam_(slam),
         output_(output),
         options_(options),

@@ -51,4 +51,10 @@ Result<std::optional<SegmentedFrame>> SegmentAhead::next() {
   return std::move(item.result);
 }
 
+SegmentAhead::Segment segment_ahead_of(Slam& slam) {
+  const Config& config = slam.effective_config();
+  if (!config.needs_segmentation() || config.deterministic || config.realtime) return {};
+  return [&slam](const RgbdFrame& frame) { return slam.segment(frame); };
+}
+
 }  // namespace semvslam

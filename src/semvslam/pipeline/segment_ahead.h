@@ -11,6 +11,7 @@
 #include "semvslam/base/bounded_queue.h"
 #include "semvslam/base/result.h"
 #include "semvslam/data/frame.h"
+#include "semvslam/pipeline/slam.h"
 #include "semvslam/semantic/segmentation.h"
 
 namespace semvslam {
@@ -58,5 +59,9 @@ class SegmentAhead {
   bool fatal_ = false;
   std::vector<std::jthread> threads_;
 };
+
+/// Every frame of a recording gets its own mask, made while the frames before are tracked. Where the order of all steps
+/// is fixed, or no mask may be waited for, there is none to make ahead (empty): the system segments by itself.
+SegmentAhead::Segment segment_ahead_of(Slam& slam);
 
 }  // namespace semvslam

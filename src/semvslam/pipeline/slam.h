@@ -112,9 +112,8 @@ class Slam {
   ~Slam();
 
   /// Tracks one frame. Image sizes must be the camera's, and its stamp later than that of the frame before: anything
-  /// else is an Error and the frame is not used. Where the
-  /// configuration wants masks the frame is segmented first, on this thread; with Config::realtime beside it, and the
-  /// newest mask there is serves.
+  /// else is an Error and the frame is not used. Where the configuration wants masks the frame is segmented first, on
+  /// this thread; with Config::realtime beside it, and the newest mask there is serves.
   Result<TrackResult> process(const RgbdFrame& frame);
   /// The same for a frame that segment() was called for before, on any thread.
   Result<TrackResult> process(const RgbdFrame& frame, std::optional<Segmentation> segmentation);

@@ -12,6 +12,22 @@ namespace py = pybind11;
 namespace semvslam {
 namespace {
 
+PyObject* python_type_of(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidInput:
+      return PyExc_ValueError;
+    case ErrorCode::kNotFound:
+      return PyExc_FileNotFoundError;
+    case ErrorCode::kIo:
+      return PyExc_OSError;
+    case ErrorCode::kUnsupported:
+      return PyExc_NotImplementedError;
+    case ErrorCode::kInternal:
+      break;
+  }
+  return PyExc_RuntimeError;
+}
+
 std::string shape_text(const py::array& array) {
   std::string out = fmt::format("{} [", py::str(array.dtype()).cast<std::string>());
   for (py::ssize_t i = 0; i < array.ndim(); ++i) out += fmt::format("{}{}", i > 0 ? ", " : "", array.shape(i));
@@ -48,22 +64,7 @@ cv::Mat copy_of(const py::array& array, cv::Size size, int type) {
 }  // namespace
 
 void raise(const Error& error) {
-  switch (error.code) {
-    case ErrorCode::kInvalidInput:
-      throw py::value_error(error.message);
-    case ErrorCode::kNotFound:
-      PyErr_SetString(PyExc_FileNotFoundError, error.message.c_str());
-      throw py::error_already_set();
-    case ErrorCode::kIo:
-      PyErr_SetString(PyExc_OSError, error.message.c_str());
-      throw py::error_already_set();
-    case ErrorCode::kUnsupported:
-      PyErr_SetString(PyExc_NotImplementedError, error.message.c_str());
-      throw py::error_already_set();
-    case ErrorCode::kInternal:
-      break;
-  }
-  PyErr_SetString(PyExc_RuntimeError, error.message.c_str());
+  PyErr_SetString(python_type_of(error.code), error.message.c_str());
   throw py::error_already_set();
 }
 

@@ -73,12 +73,8 @@ class FramesAhead {
   /// Both must outlive this object.
   FramesAhead(System& system, Recording& recording) : must_be_whole_(recording.must_be_whole()) {
     Slam& slam = system.slam();
-    const Config& config = slam.effective_config();
-    SegmentAhead::Segment segment;
-    if (config.needs_segmentation() && !config.deterministic && !config.realtime)
-      segment = [&slam](const RgbdFrame& frame) { return slam.segment(frame); };
-    ahead_ = std::make_unique<SegmentAhead>(recording.lend(), std::move(segment),
-                                            static_cast<std::size_t>(config.segment_at_once), kWaiting);
+    const auto at_once = static_cast<std::size_t>(slam.effective_config().segment_at_once);
+    ahead_ = std::make_unique<SegmentAhead>(recording.lend(), segment_ahead_of(slam), at_once, kWaiting);
   }
   ~FramesAhead() {
     const py::gil_scoped_release others_may_run;
